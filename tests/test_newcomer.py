@@ -59,13 +59,14 @@ def test_a_page_is_taken_apart():
 
 def test_a_short_chain_runs_and_what_fails_is_seen(tmp_path):
     page = "```sh\ncdpr new robot gantry --from acrobot_large\ncdpr check gantry.yaml\n```\n"
-    page += '```python\nprint("outcome: timeout")\n```\n```sh\ncdpr check nowhere.yaml\n```\n'
+    page += '```python\nprint("outcome: timeout")\n```\n```sh\ncdpr chek gantry.yaml\n```\n'
     # Steps and what is said of them are looked at, not how long a first use takes.
     player = Player(Path(sys.prefix), tmp_path, cache=Path(os.environ["NUMBA_CACHE_DIR"]))
     made, checked, missing, program = map(player.play, page_steps("page", page))
     assert (made.problem, checked.problem) == ("", "")
     assert checked.processor > 0.0
-    assert missing.problem == "exit code 2: nowhere.yaml: there is no such file, robot or scenario"
+    assert missing.problem.startswith("exit code 2: ")
+    assert "chek" in missing.problem
     assert program.problem == 'a run ends by "timeout"'
     assert "4 steps, 2 failed" in table([made, checked, missing, program])
 

@@ -332,6 +332,11 @@ def _sensor_believed(model: FreeMotionModel, stretches: Sequence[Stretch]) -> Fr
     return replace(model, unknowns=changed)
 
 
+def steps_within(x: Array, least: Array, largest: Array) -> tuple[Array, Array]:
+    """Steps down and up for slopes at x, `SMALL` each, or less where a bound is nearer."""
+    return np.minimum(SMALL, x - least), np.minimum(SMALL, largest - x)
+
+
 @dataclass(frozen=True, eq=False)
 class _Search:
     """The unknowns in sizes, and of each stretch what moves its first state, in sizes."""
@@ -391,18 +396,18 @@ class _Search:
 
         def jacobian(x: Array) -> Array:
             z, states = parts(x)
-            rows = []
+            rows, (down, up) = [], steps_within(x, least, largest)
             each = zip(states, starts, self.stretches, strict=True)
             for j, (y, at, s) in enumerate(each):
                 J = np.zeros((s.count * (6 + len(self.model.robot.cables)) + one, len(x)))
                 for k in range(len(f)):
-                    by = SMALL * np.eye(len(z))[f[k]]
-                    ahead, back = (self.part(z + side * by, y, at, s) for side in (1.0, -1.0))
-                    J[:, k] = (ahead - back) / (2.0 * SMALL)
+                    unit = np.eye(len(z))[f[k]]
+                    ahead, back = (self.part(z + d * unit, y, at, s) for d in (up[k], -down[k]))
+                    J[:, k] = (ahead - back) / (up[k] + down[k])
                 for k in range(one):
-                    by = SMALL * np.eye(one)[k]
-                    ahead, back = (self.part(z, y + side * by, at, s) for side in (1.0, -1.0))
-                    J[:, len(f) + one * j + k] = (ahead - back) / (2.0 * SMALL)
+                    unit, c = np.eye(one)[k], len(f) + one * j + k
+                    ahead, back = (self.part(z, y + d * unit, at, s) for d in (up[c], -down[c]))
+                    J[:, c] = (ahead - back) / (up[c] + down[c])
                 rows.append(J)
             rows.append(np.eye(len(f), len(x)))
             return np.vstack(rows)

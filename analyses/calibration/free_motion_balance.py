@@ -101,7 +101,7 @@ def unexplained(
             savgol_filter(rows, window, ORDER, deriv=derivative, delta=stretch.step, axis=0)
         )
 
-    platform, cables = model.platform(vector), model.robot.cable_set()
+    platform, cables = model.platform(vector), model.cables
     R, c, mass = turns.as_matrix(), platform.p_PCo, platform.mass
     arms = R @ c
     wrench = np.empty((stretch.count, 6))  # of the cables about the centre of mass

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -24,6 +25,7 @@ from cdpr_drake.dynamics.robot_arrays import CREEPING, RUBBING, Drive, RobotArra
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
 from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.identification.parameters import CENTER, DAMPING, MASS_GROUP, MOMENTS, STIFFNESS
@@ -148,6 +150,11 @@ class FreeMotionModel:
         ]  # fmt: skip
         return FreeMotionModel(robot, start, tuple(asked), step, fixed)
 
+    @cached_property
+    def cables(self) -> CableSet:
+        """As they are believed; searches ask for them at each step. Read, not written."""
+        return self.robot.cable_set()
+
     @property
     def names(self) -> list[str]:
         """Of the vector."""
@@ -213,7 +220,7 @@ class FreeMotionModel:
 
     def arrays(self, vector: Array) -> RobotArrays:
         """The robot at a vector, as the kernels take it."""
-        n, cables = self.by_name(vector), self.robot.cable_set()
+        n, cables = self.by_name(vector), self.cables
         believed = float(np.mean(cables.stiffness))
         share = n["all.stiffness"] / believed
         cables = replace(
@@ -237,7 +244,7 @@ class FreeMotionModel:
         """What the cables do beside the elastic law at a vector."""
         n = self.by_name(vector)
         return replace(
-            behaviour_of(self.robot.cable_set()), stiffening=n["all.stiffening"],
+            behaviour_of(self.cables), stiffening=n["all.stiffening"],
             creep_stiffness=n["all.creep_stiffness"], creep_time=n["all.creep_time"],
         )  # fmt: skip
 
@@ -274,7 +281,7 @@ class FreeMotionModel:
             state = np.concatenate([state, self.contacts(vector).slip * share])
         if arrays.kinds[CREEPING] > 0:  # strains about which the platform swings
             l0 = self.lengths(vector) * self.behaviour(vector).longer()
-            at_rest = cable_paths(self.start, self.robot.cable_set()).lengths / l0 - 1.0
+            at_rest = cable_paths(self.start, self.cables).lengths / l0 - 1.0
             state = np.concatenate([state, np.maximum(at_rest, 0.0)])
         states, tensions = np.full((count, len(state)), np.nan), np.full((count, m), np.nan)
         asked = (np.zeros(m), step, self.step, states, tensions, np.zeros(4))
@@ -290,7 +297,7 @@ class FreeMotionModel:
             EquilibriumError: The platform does not rest anywhere near.
         """
         platform, n = self.platform(vector), self.by_name(vector)
-        cables = self.robot.cable_set()
+        cables = self.cables
         share = n["all.stiffness"] / float(np.mean(cables.stiffness))
         cables = replace(cables, stiffness=cables.stiffness * share)
         l0 = self.lengths(vector)

@@ -120,7 +120,7 @@ def first_state(model: FreeMotionModel, vector: Array, stretch: Stretch) -> Arra
 
 def _jacobian(model: FreeMotionModel, turn: Rotation, place: Array) -> Array:
     row = np.concatenate([turn.as_quat()[[3, 0, 1, 2]], place])
-    return cable_paths(pose_from_row(row), model.robot.cable_set()).J
+    return cable_paths(pose_from_row(row), model.cables).J
 
 
 def places_by_lengths(
@@ -131,7 +131,7 @@ def places_by_lengths(
     Least squares of the lengths, by Gauss and Newton; NaN where cables cannot run, and for fewer
     than three cables.
     """
-    cables, l0 = model.robot.cable_set(), model.lengths(vector)
+    cables, l0 = model.cables, model.lengths(vector)
     n = model.by_name(vector)
     EA = cables.stiffness * n["all.stiffness"] / float(np.mean(cables.stiffness))
     does = model.behaviour(vector)

@@ -65,7 +65,7 @@ class StartCoordinates:
         Raises:
             CableGeometryError: A cable cannot run there.
         """
-        cables = model.robot.cable_set()
+        cables = model.cables
         paths = cable_paths(_pose(model, near), cables)
         U, s, V = np.linalg.svd(paths.J * MOVED[:6])
         r = int(np.count_nonzero(s > FELT * s[0]))
@@ -114,7 +114,7 @@ class StartCoordinates:
         """How far cables are stretched at a first state, times how stiff they are beside what is
         believed, shape (m,) [m], and its derivatives by rotation vector and translation, (m, 6)."""
         model = self.model
-        cables = model.robot.cable_set()
+        cables = model.cables
         share = model.by_name(vector)["all.stiffness"] / float(np.mean(cables.stiffness))
         paths = cable_paths(_pose(model, moved), cables)
         J = np.hstack([paths.J[:, :3] @ _turning(moved[:3]), paths.J[:, 3:]])
@@ -145,7 +145,7 @@ class StartCoordinates:
         unstrained lengths [m]."""
         model = self.model
         return (
-            model.robot.cable_set().stiffness, model.behaviour(vector).stiffening,
+            model.cables.stiffness, model.behaviour(vector).stiffening,
             model.lengths(vector),
         )  # fmt: skip
 

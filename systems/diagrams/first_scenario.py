@@ -155,7 +155,9 @@ def _best_start(robot: Robot, starts: Sequence[_Start], taut: float) -> tuple[Po
     """The first start from which the way to the goal is held best, and how well."""
     best, most = None, REFUSED
     for start in starts:
-        level = min(_held(robot, each.transform(), taut) for each in (start.pose, start.halfway))
+        level = _held(robot, start.pose.transform(), taut)
+        if level > most:  # else the pose halfway makes it no better
+            level = min(level, _held(robot, start.halfway.transform(), taut))
         if level > most:
             best, most = start.pose, level
         if most == TAUT:

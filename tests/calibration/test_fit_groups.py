@@ -18,7 +18,7 @@ EXACT = 1e-8
 """Share by which block elimination and dense algebra differ."""
 
 
-def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0, count=COUNT):
+def fitted(noise=1.0, seed=0, spoil=lambda readings: None, place=1.0, count=COUNT):
     """A result and its problem: lengths of eight cables and tracked poses, with sigmas as said."""
     random, true = np.random.default_rng(seed), true_model()
     at = poses(count, random)
@@ -26,7 +26,8 @@ def fitted(noise=1.0, seed=0, spoil=lambda readings: readings, place=1.0, count=
     program = CalibrationProgram(true, at, ["length_offsets"])
     program.AddPrior(["length_offsets"], 0.05)
     readings = simulated_lengths(true, at, zero, SIGMA, random)
-    program.AddLengths(spoil(readings), SIGMA / noise, zero)
+    spoil(readings)
+    program.AddLengths(readings, SIGMA / noise, zero)
     seen = simulated_poses(at, TURN, PLACE, random)
     program.AddTrackedPoses(seen, TURN / place, PLACE / place)
     result = program.Solve()
@@ -53,12 +54,10 @@ def test_directions_are_projected_as_by_dense_least_squares(clean):
     poses_of = np.zeros((k, rows, k, q))
     poses_of[np.arange(k), :, np.arange(k)] = B
     prior = problem.prior.evaluate(at, problem.free)[1] * at.layout.typical[problem.free]
-    J = np.vstack(
-        [
-            np.hstack([A.reshape(k * rows, -1), poses_of.reshape(k * rows, k * q)]),
-            np.hstack([prior, np.zeros((len(prior), k * q))]),
-        ]
-    )
+    J = np.block([
+        [A.reshape(k * rows, -1), poses_of.reshape(k * rows, k * q)],
+        [prior, np.zeros((len(prior), k * q))],
+    ])  # fmt: skip
     Q = np.linalg.qr(J)[0]
     D = np.random.default_rng(1).standard_normal((k, rows, 3))
     whole = np.vstack([D.reshape(k * rows, 3), np.zeros((len(prior), 3))])
@@ -77,24 +76,24 @@ def test_scatter_of_each_kind_is_found_whatever_its_stated_sigma():
     np.testing.assert_allclose(mean, [1.5, 1.0 / 1.5], rtol=0.1)  # of 6 x 144 degrees or more
 
 
+def counting(problem, result):
+    """Faults that count."""
+    return [fault for fault in group_faults(problem, result) if fault.counts]
+
+
 @pytest.mark.parametrize("noise", [0.25, 1.0, 2.0])
 def test_noise_alone_makes_no_fault(noise):
-    problem, result = fitted(noise=noise)
-    assert [fault for fault in group_faults(problem, result) if fault.counts] == []
-
-
-def scaled(cable, factor):
-    def spoil(readings):
-        readings[:, cable] *= factor
-        return readings
-
-    return spoil
+    assert counting(*fitted(noise=noise)) == []
 
 
 def test_a_factor_of_one_cable_is_estimated_with_its_deviation():
     """Small enough that nothing is thrown out; sigmas stated ten times too large."""
-    problem, result = fitted(noise=0.1, spoil=scaled(2, 1.02), place=0.1)
-    fault = next(f for f in group_faults(problem, result) if f.test == "factor")
+
+    def spoil(readings):
+        readings[:, 2] *= 1.02
+
+    found = group_faults(*fitted(noise=0.1, spoil=spoil, place=0.1))
+    fault = next(f for f in found if f.test == "factor")
     assert fault.quantity == "length of C3"
     assert fault.std < 2e-3
     assert abs(fault.size - 1.02) < 4.0 * fault.std
@@ -103,12 +102,9 @@ def test_a_factor_of_one_cable_is_estimated_with_its_deviation():
 
 def test_a_reading_late_by_a_row_is_named():
     def late(readings):
-        readings[1:, 4] = readings[:-1, 4]
-        return readings
+        readings[1:, 4] = readings[:-1, 4].copy()
 
-    problem, result = fitted(spoil=late)
-    faults = [fault for fault in group_faults(problem, result) if fault.counts]
-    assert any("length of C5" in fault.quantity for fault in faults)
+    assert any("length of C5" in fault.quantity for fault in counting(*fitted(spoil=late)))
 
 
 def test_rows_that_one_factor_explains_are_named():
@@ -116,10 +112,8 @@ def test_rows_that_one_factor_explains_are_named():
 
     def spoil(readings):
         readings[rows] *= 1.05
-        return readings
 
-    problem, result = fitted(spoil=spoil)
-    fault = group_faults(problem, result)[0]
+    fault = group_faults(*fitted(spoil=spoil))[0]
     assert fault.counts
     assert list(fault.rows) == rows
     assert fault.size == pytest.approx(1.05, abs=0.01)
@@ -128,14 +122,11 @@ def test_rows_that_one_factor_explains_are_named():
 
 def test_single_outliers_are_no_group():
     def spoil(readings):
-        readings[5, 1] += 0.05
-        readings[11, 6] -= 0.2
-        readings[20, 0] += 0.01
-        return readings
+        readings[[5, 11, 20], [1, 6, 0]] += [0.05, -0.2, 0.01]
 
     problem, result = fitted(spoil=spoil)
     assert len(result.outliers) == 3
-    assert [fault for fault in group_faults(problem, result) if fault.counts] == []
+    assert counting(problem, result) == []
 
 
 def test_a_sensor_that_loses_a_third_is_named_and_fewer_are_not():
@@ -143,7 +134,6 @@ def test_a_sensor_that_loses_a_third_is_named_and_fewer_are_not():
         def off(readings):
             count = round(share * COUNT)
             readings[1 : 1 + count, 3] += np.random.default_rng(3).choice([-1, 1], count) * 0.1
-            return readings
 
         return off
 
@@ -158,7 +148,6 @@ def test_a_row_that_lost_more_than_checks_it_contradicts_itself():
 
     def spoil(readings):
         readings[6] += 0.05 * np.array([1, -1, 1, 1, -1, 1, -1, -1])
-        return readings
 
     fault = next(f for f in group_faults(*fitted(spoil=spoil)) if f.test == "rows")
     assert fault.rows == (6,)
@@ -179,7 +168,6 @@ def test_runs_are_as_rare_as_among_all_orders(positive):
 def test_a_reading_that_swings_slowly_has_too_few_runs():
     def spoil(readings):
         readings[:, 2] += 8.0 * SIGMA * np.sin(np.linspace(0.0, 2.0 * np.pi, 60))
-        return readings
 
     runs = [f for f in group_faults(*fitted(noise=0.25, spoil=spoil, count=60)) if f.test == "runs"]
     assert [fault.quantity for fault in runs] == ["length of C3"]

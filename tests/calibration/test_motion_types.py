@@ -7,11 +7,11 @@ from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.motion_type import MotionType
 from tests.calibration.motion_logs import MOTIONS, chi_square, program_of
 
-LOGS = 60
+LOGS = 40
 """Logs of a test; the module counts a thousand when it is run as a script."""
 
 SPREAD = 0.15
-"""Chi-square of sixty logs of a dozen parameters is off by 0.053 rms: this is 2.8 times as much;
+"""Chi-square of forty logs of a dozen parameters is off by 0.065 rms: this is 2.3 times as much;
 the seeds are fixed."""
 
 SAME = 1e-6

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, InitializeAutoDiff
@@ -10,13 +12,7 @@ from cdpr_drake.calibration.parameters import model_difference, moved_model
 from cdpr_drake.calibration.pose_search import robust_costs
 from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.errors import CalibrationError
-from tests.calibration.bench import (
-    camera_program,
-    poses,
-    start_readings,
-    true_model,
-    wrong_model,
-)
+from tests.calibration.bench import camera_program, poses, start_readings, true_model, wrong_model
 
 SURE = 1e-4
 """Probability with which a test on random numbers may fail; seeds are fixed."""
@@ -70,13 +66,10 @@ def test_errors_of_the_camera_alone_are_as_large_as_their_covariance_says(seed):
 
 def test_what_cannot_be_told_is_named():
     program = tracker_program(true_model(), ["C3.exit_point.z", "C3.length_offset"], count=1)
-    with pytest.raises(CalibrationError) as problem:
+    one, other = "C3's exit point along z", "C3's length offset"
+    either = f"({one} cannot be told from {other}|{other} cannot be told from {one})"
+    with pytest.raises(CalibrationError, match=f"^unknown: {either}; accepted: "):
         program.Solve()
-    assert str(problem.value).startswith(
-        "unknown: C3's exit point along z cannot be told from C3's length offset; accepted: "
-    ) or str(problem.value).startswith(
-        "unknown: C3's length offset cannot be told from C3's exit point along z; accepted: "
-    )
 
 
 def test_a_drum_that_turned_once_cannot_be_told_from_where_counting_began():
@@ -86,11 +79,10 @@ def test_a_drum_that_turned_once_cannot_be_told_from_where_counting_began():
     start = start_readings(true, elsewhere)
     program.AddLengths(simulated_lengths(true, at[:1], start, 1e-4, random), 1e-4, start)
     program.AddTrackedPoses(at[:1], 1e-3, 1e-4)
-    with pytest.raises(CalibrationError) as problem:
+    with pytest.raises(CalibrationError, match=" cannot be told from ") as problem:
         program.Solve()
-    assert "C3's drum radius" in str(problem.value)
-    assert "C3's length offset" in str(problem.value)
-    assert " cannot be told from " in str(problem.value)
+    told = set(re.findall(r"C3's \w+ \w+", str(problem.value)))
+    assert told >= {"C3's drum radius", "C3's length offset"}
 
 
 def test_a_prior_tells_what_measurements_cannot():
@@ -129,16 +121,17 @@ def test_outliers_are_found_and_do_not_count():
     np.testing.assert_allclose(result.values, clean.values, atol=3e-4)
 
 
-def test_a_search_that_ends_worse_than_it_began_goes_down_from_its_start(monkeypatch):
-    # As linear loss may lead: into a minimum far away.
-    program = tracker_program(true_model(), ["exit_points"])
-    before = float(np.sum(robust_costs(program.terms, program.at())))
+def far_away(program):
+    """An end of a search in a minimum far away, as linear loss may lead to."""
     away = np.zeros(program.layout.size)
     away[:24] = 0.3
-    far = program.at().moved(away, np.zeros((12, 6)))
-    monkeypatch.setattr(
-        CalibrationProgram, "Approach", lambda self, steps, start: Minimum(far, 0.0, 1, True)
-    )
+    return lambda *_, **__: Minimum(program.at().moved(away, np.zeros((12, 6))), 0.0, 1, True)
+
+
+def test_a_search_that_ends_worse_than_it_began_goes_down_from_its_start(monkeypatch):
+    program = tracker_program(true_model(), ["exit_points"])
+    before = float(np.sum(robust_costs(program.terms, program.at())))
+    monkeypatch.setattr(CalibrationProgram, "Approach", far_away(program))
     result = program.Solve()
     assert result.robust_cost <= before
     assert np.max(np.abs(result.values)) < 0.01
@@ -146,19 +139,14 @@ def test_a_search_that_ends_worse_than_it_began_goes_down_from_its_start(monkeyp
 
 def test_an_end_worse_than_its_start_is_refused(monkeypatch):
     program = tracker_program(true_model(), ["exit_points"])
-    away = np.zeros(program.layout.size)
-    away[:24] = 0.3
-    far = program.at().moved(away, np.zeros((12, 6)))
-    monkeypatch.setattr(
-        "cdpr_drake.calibration.program.minimize", lambda *arguments: Minimum(far, 0.0, 1, True)
-    )
+    monkeypatch.setattr("cdpr_drake.calibration.program.minimize", far_away(program))
     with pytest.raises(CalibrationError, match=r"search: found an end with cost .* after a start"):
         program.Solve()
 
 
 def test_snopt_finds_no_better_parameters():
     start = wrong_model(true_model(), 0.002, 0.0, np.random.default_rng(1))
-    program = tracker_program(start, ["exit_points"], count=6)
+    program = tracker_program(start, ["exit_points"], count=4)
     program.AddPrior(["exit_points"], 0.01)
     result = program.Solve(outliers=False)
     prog = program.prog()
@@ -185,9 +173,8 @@ def test_gradients_of_the_program_are_exact():
         assert isinstance(value, AutoDiffXd)
         for j in range(0, len(mine), 5):
             step = 1e-6 * np.eye(len(mine))[j]
-            numeric = (
-                binding.evaluator().Eval(mine + step) - binding.evaluator().Eval(mine - step)
-            ) / 2e-6
+            ahead, behind = (binding.evaluator().Eval(mine + s) for s in (step, -step))
+            numeric = (ahead - behind) / 2e-6
             scale = np.max(np.abs(value.derivatives()))
             assert value.derivatives()[j] == pytest.approx(numeric[0], abs=1e-7 * scale)
 
@@ -202,17 +189,19 @@ def test_gradients_of_the_program_are_exact():
         (lambda p: p.AddPrior(["exit_point"], 1.0), "accepted: exit_points"),
         (lambda p: p.AddPrior(["exit_points"], -1.0), "found -1"),
         (lambda p: p.AddSwivels(np.full((1, 8), np.nan), 1e-3), "measurements: found none"),
+        (
+            lambda p: p.AddTrackedPoints(np.zeros((3, 3)), 1e-3),
+            r"tracked positions: found shape \(3, 3\)",
+        ),
+        (lambda p: p.AddTrackedPoints(np.zeros((1, 3)), 0.0), "tracked positions: sigma: found 0"),
+        (lambda p: p.AddZeroedCables(np.zeros((1, 3)), 1e-3, None), "lengths: found shape"),
     ],
 )
 def test_bad_input_is_named(change, words):
     program = CalibrationProgram(true_model(), poses(1, np.random.default_rng(0)), ["exit_points"])
 
-    def ask():
-        change(program)
-        program.Solve()
-
     with pytest.raises(CalibrationError, match=words):
-        ask()
+        (change(program), program.Solve())
 
 
 def test_a_pose_that_nothing_determines_is_named():

@@ -8,28 +8,35 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.front import simulation
+from cdpr_drake.analyses.front import simulation, stability, workspaces
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.cli import plan
 
 
 @contextmanager
 def only(*endings):
-    """Lets runs and plans write their data and, of all that follows, files with these endings."""
+    """Lets runs, plans and grids write their data and, of pictures, files with these endings."""
 
     def write(folder, pictures, *more):
         kept = {name: draw for name, draw in pictures.items() if name.endswith(endings)}
         return write_pictures(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (simulation, plan):
+        for module in (simulation, plan, stability, workspaces):
             patch.setattr(module, "write_pictures", write)
         yield
 
 
 @pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A folder of its own, where the command is called."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
 def without_pictures():
-    """For runs whose figures nobody looks at: to draw them takes longer than to simulate."""
+    """Where nobody looks at figures: to draw them takes longer than to compute."""
     with only(".mat", ".parquet"):
         yield
 

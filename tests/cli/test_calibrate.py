@@ -1,4 +1,5 @@
-import json
+"""`cdpr calibrate`: robots from trackers, cameras, winches and a recorded series."""
+
 from pathlib import Path
 
 import numpy as np
@@ -14,14 +15,13 @@ from cdpr_drake.calibration.measurements import (
     simulated_swivels,
 )
 from cdpr_drake.calibration.stations import Point, Stations
-from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.messages import printed
+from tests.cli.commands import refuse, run, told
 
 COUNT = 20
 RANDOM = np.random.default_rng(0)
@@ -58,27 +58,27 @@ def pose_columns(poses):
     return dict(zip(("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"), rows.T, strict=True))
 
 
-@pytest.fixture
-def tracked(tmp_path):
+@pytest.fixture(scope="module")
+def tracked():
     random = np.random.default_rng(1)
     readings = simulated_lengths(TRUE, POSES, START, 1e-4, random)
-    columns = length_columns(readings) | pose_columns(simulated_poses(POSES, 1e-3, 5e-4, random))
-    return columns
+    return length_columns(readings) | pose_columns(simulated_poses(POSES, 1e-3, 5e-4, random))
 
 
-SIGMA = ["--sigma", "lengths=1e-4,place=5e-4,turn=1e-3"]
+SIGMA = ("--sigma", "lengths=1e-4,place=5e-4,turn=1e-3")
+ASKED = ("calibrate", "acrobot_small", "log.csv", "--out", "out")
 
 
-def test_a_tracker_calibrates_and_scenarios_believe_it(tmp_path, tracked, capsys):
+def test_a_tracker_calibrates_and_scenarios_believe_it(here, tracked, capsys):
     shifts = 0.004 * np.random.default_rng(2).standard_normal((8, 3))
     nominal = load_robot("acrobot_small")
     for cable, shift in zip(nominal.cables, shifts, strict=True):
         cable.exit_point = cable.exit_point + shift
-    file = tmp_path / "nominal.yaml"
-    file.write_text(yaml_dump_typed(nominal))
-    out = tmp_path / "out"
-    arguments = ["calibrate", str(file), write(tmp_path / "log.csv", tracked), *SIGMA, "--next=4"]
-    found = answered([*arguments, "--unknown", "exit_points", "--out", str(out), "--json"], capsys)
+    (here / "nominal.yaml").write_text(yaml_dump_typed(nominal))
+    write(here / "log.csv", tracked)
+    out = here / "out"
+    words = ("calibrate", "nominal.yaml", "log.csv", *SIGMA, "--next=4", "--out", "out")
+    found = told(capsys, *words, "--unknown", "exit_points")
     assert found["status"] == "converged"
     assert {p.name for p in out.iterdir()} >= {
         "robot.yaml", "results.json", "calibration.png", "correlation.png", "next_poses.csv",
@@ -93,18 +93,16 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(tmp_path, tracked, capsys
 
 
 @pytest.mark.usefixtures("no_room_for_pictures")
-def test_figures_that_fail_cost_nothing_else(tmp_path, tracked, capsys):
-    out, log = tmp_path / "out", write(tmp_path / "log.csv", tracked)
-    with pytest.raises(SystemExit) as end:
-        main(["calibrate", "acrobot_small", log, *SIGMA, "--out", str(out)])
-    assert end.value.code == 3
-    err = printed(capsys).err
+def test_figures_that_fail_cost_nothing_else(here, tracked, capsys):
+    write(here / "log.csv", tracked)
+    code, _, err = run(capsys, *ASKED, *SIGMA)
+    assert code == 3
     assert "calibration.png: not written: [Errno 28]" in err
-    assert {path.name for path in out.iterdir()} >= {"robot.yaml", "results.json"}
-    assert not list(out.rglob("*png*"))
+    assert {path.name for path in (here / "out").iterdir()} >= {"robot.yaml", "results.json"}
+    assert not list((here / "out").rglob("*png*"))
 
 
-def test_the_camera_alone_calibrates(tmp_path, capsys):
+def test_the_camera_alone_calibrates(here, capsys):
     random = np.random.default_rng(3)
     pinhole = load_camera("ids_kowa").pinhole(640, 480)
     uv = simulated_corners(TRUE, POSES, {k: TagTarget(k, 0.06) for k in TAGS}, pinhole, 0.2, random)
@@ -115,92 +113,68 @@ def test_the_camera_alone_calibrates(tmp_path, capsys):
         for c in range(4)
         for k, a in enumerate("uv")
     }
-    log = write(tmp_path / "log.csv", columns)
-    arguments = [
-        "calibrate", "acrobot_small", log, "--unknown", "exit_points",
-        "--prior", "exit_points=0.005", "--sigma", "lengths=1e-4", "--tag-size", "0.06",
-        "--image-size", "640x480",
-        "--out", str(tmp_path / "out"), "--json",
-    ]  # fmt: skip
-    found = answered(arguments, capsys)
+    write(here / "log.csv", columns)
+    found = told(
+        capsys, *ASKED, "--unknown", "exit_points", "--prior", "exit_points=0.005",
+        "--sigma", "lengths=1e-4", "--tag-size", "0.06", "--image-size", "640x480",
+    )  # fmt: skip
     assert len(found["gauge"]) == 4
     assert found["residuals_over_sigma"] == pytest.approx(1.0, abs=0.15)
     errors = [p["change"] / p["std"] for p in found["parameters"] if "exit" in p["name"]]
     assert np.max(np.abs(errors)) < 5.0  # they began where they truly are
 
 
-def test_winches_and_swivels_alone_find_where_they_began(tmp_path, capsys):
+def test_winches_and_swivels_alone_find_where_they_began(here, capsys):
     random = np.random.default_rng(4)
     readings = simulated_lengths(TRUE, POSES, START, 2e-4, random) - START
     angles = simulated_swivels(TRUE, POSES, 2e-3, random)
     table = np.hstack([readings, angles - angles[0]])
-    log = tmp_path / "homing.txt"
+    log = here / "homing.txt"
     log.write_text("\n".join(" ".join(f"{v:.9g}" for v in row) for row in table))
-    arguments = [
-        "calibrate", "acrobot_small", str(log), "--unknown", "length_offsets", "--no-rest",
-        "--sigma", "lengths=2e-4,swivels=3e-3", "--out", str(tmp_path / "out"), "--json",
-        "--start", "0.15,0.1,0.2,15,5,5",
-    ]  # fmt: skip
-    found = answered(arguments, capsys)
+    found = told(
+        capsys, "calibrate", "acrobot_small", log, "--unknown", "length_offsets", "--no-rest",
+        "--sigma", "lengths=2e-4,swivels=3e-3", "--start", "0.15,0.1,0.2,15,5,5",
+    )  # fmt: skip
     for row, X_WP in zip(found["poses_X_WP"], POSES, strict=True):
         distance, angle = pose_error(X_WP, pose_from_row(np.array(row)))
         assert distance < 0.01
         assert np.degrees(angle) < 2.0
 
 
-def test_swivels_of_the_other_sign_end_with_code_six(tmp_path, capsys):
+def test_swivels_of_the_other_sign_end_with_code_six(here, capsys):
     random = np.random.default_rng(4)
-    columns = length_columns(simulated_lengths(TRUE, POSES, START, 2e-4, random)[:10])
-    angles = -simulated_swivels(TRUE, POSES[:10], 2e-3, random)
+    columns = length_columns(simulated_lengths(TRUE, POSES, START, 2e-4, random)[:6])
+    angles = -simulated_swivels(TRUE, POSES[:6], 2e-3, random)
     columns |= {f"C{i + 1}_swivel_rad": angles[:, i] for i in range(8)}
-    columns |= {f"C{i + 1}_torque_nm": np.ones(10) for i in range(2)}
-    arguments = [
-        "calibrate", "acrobot_small", write(tmp_path / "log.csv", columns), "--no-rest",
-        "--unknown", "C1.length_offset", "--sigma", "lengths=2e-4,swivels=3e-3",
-        "--out", str(tmp_path / "out"), "--json",
-    ]  # fmt: skip
-    found = answered(arguments, capsys, code=6)
+    columns |= {f"C{i + 1}_torque_nm": np.ones(6) for i in range(2)}
+    write(here / "log.csv", columns)
+    found = told(
+        capsys, *ASKED, "--no-rest", "--unknown", "C1.length_offset",
+        "--sigma", "lengths=2e-4,swivels=3e-3", code=6,
+    )  # fmt: skip
     assert found["status"] == "misfit"
-    assert any("of 80 swivel angles do not fit: sign or zero?" in why for why in found["misfit"])
+    assert any("of 48 swivel angles do not fit: sign or zero?" in why for why in found["misfit"])
     assert set(found["largest_residuals"][0]) == {
         "row", "measurement", "residual", "unit", "sigmas",
     }  # fmt: skip
     assert any(words.startswith("not used: C1_torque_nm, C2_t") for words in found["remarks"])
-    assert "Calibrated: misfit" in load_robot(str(tmp_path / "out" / "robot.yaml")).assumptions
+    assert "Calibrated: misfit" in load_robot(here / "out" / "robot.yaml").assumptions
 
 
-def answered(arguments, capsys, code=0):
-    """The JSON that a command prints."""
-    with pytest.raises(SystemExit) as end:
-        main(arguments)
-    assert end.value.code == code
-    return json.loads(printed(capsys).out)
+def test_what_a_log_cannot_tell_is_refused_and_nothing_written(here, tracked, capsys):
+    write(here / "log.csv", {name: values[:1] for name, values in tracked.items()})
+    for more, words in (
+        ("--unknown=C3.exit_point.z,C3.length_offset", "cannot be told from C3's"),
+        ("--unknown=exits", "accepted: exit_points"),
+        ("--sigma=length=1", "--sigma"),
+        ("--poses-from=x", "--poses-from: found without --campaign"),
+        ("--prior=exit_points=-1", "--prior"),
+    ):
+        assert words in refuse(capsys, *ASKED, more)
+    assert [path.name for path in here.iterdir()] == ["log.csv"]
 
 
-def refused(arguments, capsys):
-    with pytest.raises(SystemExit) as problem:
-        main(arguments)
-    assert problem.value.code == 2
-    said = printed(capsys).err.splitlines()
-    assert len(said) == 1
-    return said[0]
-
-
-def test_what_a_log_cannot_tell_is_refused_and_nothing_written(tmp_path, tracked, capsys):
-    few = {name: values[:1] for name, values in tracked.items()}
-    log, out = write(tmp_path / "log.csv", few), tmp_path / "out"
-    asked = ["calibrate", "acrobot_small", log, "--out", str(out)]
-    words = refused([*asked, "--unknown", "C3.exit_point.z,C3.length_offset"], capsys)
-    assert "C3's" in words
-    assert "cannot be told from C3's" in words
-    assert not out.exists()
-    assert "accepted: exit_points" in refused([*asked, "--unknown", "exits"], capsys)
-    assert "--sigma" in refused([*asked, "--sigma", "length=1"], capsys)
-    assert "--poses-from: found without --campaign" in refused([*asked, "--poses-from=x"], capsys)
-    assert "--prior" in refused([*asked, "--prior", "exit_points=-1"], capsys)
-
-
-def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(tmp_path, capsys):
+def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(here, capsys):
     random, time = np.random.default_rng(5), np.linspace(0.0, 6.0, 121)
 
     def pose(t):
@@ -212,28 +186,13 @@ def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(tmp_path, capsys):
     readings = simulated_lengths(TRUE, [pose(t) for t in time], START, 1e-4, random)
     late = simulated_poses([pose(t - 0.2) for t in time], 1e-3, 5e-4, random)
     columns = {"time_s": time} | length_columns(readings) | pose_columns(late)
-    log, out = write(tmp_path / "log.csv", columns), tmp_path / "out"
-    asked = [
-        "calibrate",
-        "acrobot_small",
-        log,
-        *SIGMA,
-        "--unknown",
-        "exit_points",
-        "--out",
-        str(out),
-    ]
-    words = refused(asked, capsys)
+    write(here / "log.csv", columns)
+    asked = (*ASKED, *SIGMA, "--unknown", "exit_points")
+    words = refuse(capsys, *asked)
     assert "s late" in words
     shift = float(words.rpartition("--tracker-late ")[2])
     assert shift == pytest.approx(0.2, abs=5e-3)
-    found = answered([*asked, "--tracker-late", str(shift), "--json"], capsys)
-    assert found["status"] == "converged"
-
-
-def test_a_belief_with_other_cables_is_refused(capsys):
-    arguments = ["simulate", "acrobot_pbvs", "--set", "perturbations.believed_robot=planar"]
-    assert "perturbations.believed_robot: found 4 cables" in refused(arguments, capsys)
+    assert told(capsys, *asked, "--tracker-late", shift)["status"] == "converged"
 
 
 def test_what_a_robot_file_cannot_hold_is_said():
@@ -249,30 +208,16 @@ def test_what_a_robot_file_cannot_hold_is_said():
 SERIES = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.csv"
 
 
-def test_a_hangprinter_is_calibrated_from_its_recorded_series(tmp_path, capsys):
-    out = tmp_path / "out"
+def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
     unknown = "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz]"
-    found = answered(
-        ["calibrate", "hangprinter_4", str(SERIES), "--zero", "home", "--sigma", "place=1e-6",
-         "--unknown", unknown, "--bound", "tracker.[xyz]=0.001", "--hold-out", "8-9",
-         "--keep-outliers", "--out", str(out), "--json"], capsys,
+    found = told(
+        capsys, "calibrate", "hangprinter_4", SERIES, "--zero", "home", "--sigma", "place=1e-6",
+        "--unknown", unknown, "--bound", "tracker.[xyz]=0.001", "--hold-out", "8-9",
+        "--keep-outliers", "--out", "out",
     )  # fmt: skip
     assert found["status"] == "converged"
     assert found["at_bounds"] == {"tracker.x": pytest.approx(1e-3)}
     assert found["held_out"]["compared_rows"] == [8, 9]
     assert found["poses"] == 42
-    assert load_robot(str(out / "robot.yaml")).motion == "3T"
-    assert (out / "rows.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--zero", "somewhere"], "--zero: found 'somewhere'"),
-        (["--zero", "home", "--hold-out", "x"], "--hold-out: found 'x'"),
-        (["--bound", "tracker"], "--bound"),
-    ],
-)
-def test_wrong_options_of_a_point_mass_are_named(options, said, capsys, tmp_path):
-    arguments = ["calibrate", "hangprinter_4", str(SERIES), *options, "--out", str(tmp_path / "o")]
-    assert said in refused(arguments, capsys)
+    assert load_robot(here / "out" / "robot.yaml").motion == "3T"
+    assert (here / "out" / "rows.png").exists()

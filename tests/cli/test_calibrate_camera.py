@@ -7,23 +7,15 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.cli import main
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.systems.diagrams.load import load_scenario
-from tests.messages import printed
+from tests.cli.commands import refuse, told
 from tests.vision.boards import board_image, board_poses, make_board
 
 K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])
 LENS = np.array([-0.28, 0.09, 0.0012, -0.0008, 0.0])
 FOCAL = 0.005  # share of the focal length; of eight drawn images
 BOARD = ("--board", "charuco", "--squares", "9x7", "--size", "0.035")
-
-
-def ended(*arguments):
-    """Exit code of the command."""
-    with pytest.raises(SystemExit) as end:
-        main(["calibrate-camera", *arguments])
-    return end.value.code
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +34,7 @@ def images(tmp_path_factory):
 
 def test_images_become_a_camera_that_scenarios_take(images, tmp_path, capsys):
     out = tmp_path / "camera"
-    assert ended(*images, *BOARD, "--json", "--out", str(out)) == 0
-    numbers = json.loads(capsys.readouterr().out)
+    numbers = told(capsys, "calibrate-camera", *images, *BOARD, "--out", out)
     assert numbers == json.loads((out / "results.json").read_text(encoding="utf-8"))
     values = {row["name"]: row["value"] for row in numbers["parameters"]}
     assert values["fx"] == pytest.approx(520.0, rel=FOCAL)
@@ -99,8 +90,7 @@ def test_wrong_options_are_refused(images, tmp_path, capsys, changes, words):
     options = dict(zip(BOARD[::2], BOARD[1::2], strict=True)) | changes
     flat = [word for pair in options.items() for word in pair]
     out = tmp_path / "no"
-    assert ended(*images[:5], *flat, "--out", str(out)) == 2
-    assert words in printed(capsys).err
+    assert words in refuse(capsys, "calibrate-camera", *images[:5], *flat, "--out", out)
     assert not out.exists()
 
 
@@ -115,6 +105,5 @@ def test_images_that_are_none_or_too_few_are_refused(images, tmp_path, capsys):
         ([str(tmp_path / "nothing.png")], "nothing.png: found no image"),
     ):
         out = tmp_path / "no"
-        assert ended(*files, *BOARD, "--out", str(out)) == 2
-        assert words in printed(capsys).err
+        assert words in refuse(capsys, "calibrate-camera", *files, *BOARD, "--out", out)
         assert not out.exists()

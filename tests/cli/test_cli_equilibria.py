@@ -1,20 +1,10 @@
-"""`cdpr equilibria`: what it prints, what it refuses."""
-
-import json
+"""`cdpr equilibria`: what it prints."""
 
 import pytest
 import yaml
 
-from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import robot_text
-from tests.messages import printed
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main(["equilibria", *arguments])
-    out, err = printed(capsys)
-    return ended.value.code, out, err
+from tests.cli.commands import answer, told
 
 
 @pytest.fixture(scope="module")
@@ -30,67 +20,28 @@ def hung(tmp_path_factory):
 
 
 def test_all_poses_as_json(capsys, hung):
-    code, out, _ = run(capsys, hung, "--lengths", "3.8,3.8", "--json")
-    assert code == 0
-    answer = json.loads(out)
-    assert answer["evidence"]["complete"]
-    assert answer["evidence"]["lost"] == 0
-    assert {one["stability"] for one in answer["equilibria"]} >= {"stable", "unstable"}
-    lowest = answer["equilibria"][0]
+    found = told(capsys, "equilibria", hung, "--lengths", "3.8,3.8")
+    assert found["evidence"]["complete"]
+    assert found["evidence"]["lost"] == 0
+    assert {one["stability"] for one in found["equilibria"]} >= {"stable", "unstable"}
+    lowest = found["equilibria"][0]
     assert lowest["stability"] == "stable"
     assert lowest["certificate"] == "proven"
     assert lowest["tensions_n"][0] == pytest.approx(lowest["tensions_n"][1])  # a mirror image
 
 
 def test_all_poses_as_a_table(capsys, hung):
-    code, out, _ = run(capsys, hung, "--lengths", "3.8,3.8")
-    assert code == 0
+    out = answer(capsys, "equilibria", hung, "--lengths", "3.8,3.8")
     assert "poses of rest, inextensible cables, pulleys ignored: all poses are found for" in out
     assert "no isolated pose is missing" in out
 
 
 def test_elastic_cables_say_what_may_be_missing(capsys, hung):
-    code, out, _ = run(
-        capsys, hung, "--lengths", "3.8,3.8", "--cable-model", "elastic", "--searches", "30",
-        "--json",
-    )  # fmt: skip
-    assert code == 0
-    answer = json.loads(out)
-    assert answer["pulleys"]
-    assert not answer["evidence"]["complete"]
-    assert answer["evidence"]["searches"] <= 30
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--lengths", "0.5,0.5"], "no pose has them: cables 1 and 2 together are"),
-        (["--lengths", "3.8"], "--lengths: found '3.8'"),
-        (["--lengths", "3.8,-1"], "--lengths: found -1"),
-        (["--lengths", "3.8,nan"], "--lengths"),
-        ([], "found neither"),
-        (["--lengths", "3,3", "--position", "0,0,1"], "found both"),
-        (["--lengths", "3,3", "--taut", "C1"], "--taut: found without --position"),
-        (["--position", "0,0,1", "--taut", "C1,C9"], "--taut: 'C9' is unknown"),
-        (["--position", "0,0,1"], "accepted: 3 different ones"),
-        (["--lengths", "3,3", "--cable-model", "rubber"], "--cable-model: 'rubber'"),
-        (["--lengths", "3,3", "--searches", "0"], "--searches: found 0"),
-    ],
-)
-def test_what_is_refused(capsys, hung, words, said):
-    code, out, err = run(capsys, hung, *words)
-    assert code == 2
-    assert not out
-    assert said in err
-    assert len(err.strip().splitlines()) == 1
-    assert len(err) <= 500
-
-
-def test_no_weight_in_the_plane_is_named(capsys):
-    lengths = ",".join(["1.0"] * 4)
-    code, _, err = run(capsys, "planar", "--lengths", lengths)
-    assert code == 2
-    assert "no weight along the motions" in err
+    words = ("--lengths", "3.8,3.8", "--cable-model", "elastic", "--searches", "3")
+    found = told(capsys, "equilibria", hung, *words)
+    assert found["pulleys"]
+    assert not found["evidence"]["complete"]
+    assert found["evidence"]["searches"] <= 3
 
 
 SUNK = 3.2 - (4.0 - 1.3**2) ** 0.5 - 0.1
@@ -112,7 +63,6 @@ def test_bodies_in_a_plane_and_points(capsys, tmp_path, hung, motion, anchor, he
         cable["anchor_point"] = [anchor * side, 0.0, 0.1 if anchor else 0.0]
     path = tmp_path / "moved.yaml"
     path.write_text(yaml.safe_dump(text))
-    code, out, _ = run(capsys, str(path), "--lengths", "2,2", "--json")
-    assert code == 0
-    found = [one["pose"]["position_m"][2] for one in json.loads(out)["equilibria"]]
+    rests = told(capsys, "equilibria", path, "--lengths", "2,2")["equilibria"]
+    found = [one["pose"]["position_m"][2] for one in rests]
     assert found == pytest.approx(heights, abs=1e-9)

@@ -11,6 +11,7 @@ from cdpr_drake.cli.completion import asked_words, robot_words, scenario_words
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.systems.scenarios.files import scenario_names
+from tests.cli.commands import run
 from tests.messages import printed
 
 WORDS = """
@@ -25,74 +26,50 @@ except SystemExit:
 
 def asking(line, shell="bash"):
     """Environment in which the command says what it offers for a line, the cursor at its end."""
-    words = line.split(" ")
     asked = {"_CDPR_COMPLETE": f"complete_{shell}"}
     if shell == "bash":
-        asked |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    else:
-        asked |= {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
-    return asked
-
-
-def offered(line, shell="bash"):
-    """What the shell is offered, and what was imported for it."""
-    done = subprocess.run(
-        [sys.executable, "-c", WORDS],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, **asking(line, shell)},
-    )
-    out, _, imported = done.stdout.rpartition("imported: ")
-    return out.split(), imported.strip()
-
-
-def test_subcommands():
-    words, imported = offered("cdpr s")
-    assert words == [name for name in SUBCOMMANDS if name.startswith("s")]
-    assert imported == "[]"
+        return asked | {"COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+    return asked | {"_TYPER_COMPLETE_ARGS": line, "_TYPER_COMPLETE_FISH_ACTION": "get-args"}
 
 
 @pytest.mark.parametrize(
     ("line", "names"),
     [
+        ("cdpr s", [name for name in SUBCOMMANDS if name.startswith("s")]),
         ("cdpr simulate acrobot_c", ["acrobot_circles", "acrobot_circling_ring",
                                      "acrobot_computed_torque"]),
         ("cdpr equilibria ", list(robot_names())),
         ("cdpr tension ", sorted(robot_names() + mechanism_names())),
         ("cdpr view caroca_", ["caroca_gazebo"]),
+        ("zsh: cdpr view plan", ["planar"]),
+        ("fish: cdpr view plan", ["planar"]),
     ],
 )  # fmt: skip
 def test_names_are_offered_without_drake(line, names):
-    words, imported = offered(line)
-    assert words == names
-    assert imported == "[]"
-
-
-def test_names_in_other_shells():
-    for shell in ("zsh", "fish"):
-        words, imported = offered("cdpr view plan", shell)
-        assert any("planar" in word for word in words)
-        assert imported == "[]"
+    shell, _, asked = line.rpartition(": ")
+    program = [sys.executable, "-c", WORDS]
+    there = {**os.environ, **asking(asked, shell or "bash")}
+    out = subprocess.check_output(program, text=True, env=there)
+    words, _, imported = out.rpartition("imported: ")
+    assert imported == "[]\n"
+    if shell:  # these have a description of each beside it
+        assert any(name in word for name in names for word in words.split())
+    else:
+        assert words.split() == names
 
 
 def test_options_and_their_values(capsys, monkeypatch):
-    def offered_here(line):
+    def offered(line):
         for name, value in asking(line).items():
             monkeypatch.setenv(name, value)
-        monkeypatch.setattr(sys, "argv", ["cdpr"])
         with pytest.raises(SystemExit):
-            main()
+            main([])
         return printed(capsys).out.split()
 
-    assert set(offered_here("cdpr simulate acrobot_pbvs --s")) == {
-        "--scheduler",
-        "--seed",
-        "--seeds",
-        "--set",
-    }
-    assert offered_here("cdpr tension planar --method bary") == ["barycenter"]
-    assert offered_here("cdpr study case-")[0] == "case-1"
+    options = ["--scheduler", "--seed", "--seeds", "--set"]
+    assert sorted(offered("cdpr simulate acrobot_pbvs --s")) == options
+    assert offered("cdpr tension planar --method bary") == ["barycenter"]
+    assert offered("cdpr study case-")[0] == "case-1"
 
 
 def test_names_are_those_that_the_loaders_know():
@@ -107,13 +84,8 @@ def test_a_quote_that_is_open_breaks_nothing(monkeypatch):
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_the_script_for_a_shell_is_shown(shell):
-    done = subprocess.run(
-        [sys.executable, "-m", "cdpr_drake", "--show-completion", shell],
-        capture_output=True,
-        text=True,
-        check=True,
-        # Else typer asks which shell has started this, and there may be none.
-        env={**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"},
-    )
-    assert "_CDPR_COMPLETE" in done.stdout
+def test_the_script_for_a_shell_is_shown(shell, monkeypatch, capsys):
+    # Else typer asks which shell has started this, and there may be none.
+    monkeypatch.setenv("_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION", "1")
+    code, out, _ = run(capsys, "--show-completion", shell)
+    assert (code, "_CDPR_COMPLETE" in out) == (0, True)

@@ -15,6 +15,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS
 from tests.analyses.logs.recorders import hangprinter_script, motive
+from tests.cli.commands import refuse
 from tests.messages import printed
 from tests.newcomer import OWN_ROBOT
 
@@ -44,6 +45,7 @@ LONG_WORK = {
         "cdpr_drake.analyses.front.calibration.identify_log",
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
     ],
+    "scenarios": ["cdpr_drake.cli.scenarios.load_scenario"],
     "study": [SESSION],
     "reproduce": [SESSION],
     "doctor": ["cdpr_drake.cli.doctor.examine", "cdpr_drake.cli.doctor.run_jobs"],
@@ -138,11 +140,10 @@ def ended(arguments):
 
 
 @pytest.mark.parametrize("line", EXAMPLES)
-def test_an_example_is_accepted(line, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_an_example_is_accepted(line, capsys, here, monkeypatch):
     program, command, *arguments = words = shlex.split(line)
     assert program == "cdpr"
-    prepare(words, tmp_path)
+    prepare(words, here)
     arguments = [
         str(path)
         for word in arguments
@@ -160,18 +161,11 @@ def test_an_example_is_accepted(line, capsys, tmp_path, monkeypatch):
     assert found == ("accepted" if command in LONG_WORK else 0), said
 
 
-def test_every_command_has_examples_of_itself():
-    for name, (_, *lines) in COMMANDS.items():
-        assert len(lines) >= 2
-        assert all(shlex.split(line)[:2] == ["cdpr", name] for line in lines)
-
-
-def test_what_is_refused_is_no_example(capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "line",
+    ["calibrate acrobot_large --campaign acrobot_sensors",
+     "equilibria grab_four --position 0,0,0.5"],
+)  # fmt: skip
+def test_what_is_refused_is_no_example(line, here, capsys):
     """The lines that stood in the help once."""
-    monkeypatch.chdir(tmp_path)
-    for line in (
-        "calibrate acrobot_large --campaign acrobot_sensors",
-        "equilibria grab_four --position 0,0,0.5",
-    ):
-        assert ended(shlex.split(line)) == 2
-    printed(capsys)
+    refuse(capsys, *line.split())

@@ -1,23 +1,17 @@
+"""`cdpr identify`: what it finds, writes and says, and which logs and requests it refuses."""
+
 import json
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model
-from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
+from tests.cli.commands import refuse, run, told
 from tests.identification.logs import TRUE, log
-from tests.messages import printed
 
 NOISE = {"tension": 0.3, "place": 1e-4, "angle": 2e-4}
 HEADER = ["time_s", *(f"X_WP.{n}" for n in ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m"))]
-
-
-def run(*args):
-    """Exit code of `cdpr`."""
-    with pytest.raises(SystemExit) as ended:
-        main([str(arg) for arg in args])
-    return ended.value.code
 
 
 def write(path, time, poses, tensions):
@@ -36,12 +30,13 @@ def logs(tmp_path_factory):
     return fitted, write(folder / "b.csv", *log(span=4.0, seed=1, turn=0.7, move=-0.8, **NOISE))
 
 
+def identify(path, out="out"):
+    return "identify", "acrobot_large", path, "--no-pulleys", "--out", out
+
+
 def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     out = tmp_path / "out"
-    fitted, other = logs
-    args = ["identify", "acrobot_large", fitted, "--validate", other, "--no-pulleys", "--json"]
-    assert run(*args, "--out", out) == 0
-    said = json.loads(printed(capsys).out)
+    said = told(capsys, *identify(logs[0], out), "--validate", logs[1])
     assert said == json.loads((out / "identification.json").read_text())
     assert (out / "validation.png").exists()
     assert said["status"] == "optimal"
@@ -60,23 +55,20 @@ def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     np.testing.assert_allclose(found.inertia, TRUE.inertia, atol=3e-3)
 
 
-@pytest.fixture(scope="module")
-def broken(tmp_path_factory):
-    """A log of which one tension sensor shows half as much again."""
-    time, poses, tensions = log(span=4.0, **NOISE)
-    tensions[:, 3] *= 1.5
-    return write(tmp_path_factory.mktemp("broken") / "log.csv", time, poses, tensions)
-
-
-def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, broken, capsys):
-    out = tmp_path / "out"
-    args = ["identify", "acrobot_large", broken, "--no-pulleys", "--out", out]
-    assert run(*args, "--json") == 6
-    said = json.loads(capsys.readouterr().out)
+@pytest.mark.usefixtures("no_room_for_pictures")
+def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, capsys):
+    """Also where figures fail."""
+    time, poses, tensions = log(span=2.0, **NOISE)
+    tensions[:, 3] *= 1.5  # as one sensor shows it
+    path, out = write(tmp_path / "log.csv", time, poses, tensions), tmp_path / "out"
+    code, words, err = run(capsys, *identify(path, out))
+    assert code == 6
+    assert "not written: [Errno 28]" in err
+    said = json.loads((out / "identification.json").read_text())
     assert said["status"] == "misfit"
     assert said["residuals_over_sigma"] > said["misfit_factor"] == 3.0
     most = said["largest_residuals"][0]
-    assert 0.0 <= most["time_s"] <= 4.0
+    assert 0.0 <= most["time_s"] <= 2.0
     assert most["equation"].startswith(("moment about ", "force along "))
     assert most["unit"] in ("N", "N m")
     assert most["sigmas"] > 3.0
@@ -84,26 +76,17 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, broke
     assert len(times) == len(set(times)) == 5
     assert any(words.startswith("misfit: residuals are") for words in said["remarks"])
     assert "Identified: misfit" in (out / "robot.yaml").read_text()
-    assert run(*args, "--overwrite") == 6
-    told = " ".join(capsys.readouterr().out.split())
-    assert "acrobot_large: misfit" in told
-    assert "Largest residuals" in told
-    assert most["equation"] in told
-
-
-@pytest.mark.usefixtures("no_room_for_pictures")
-def test_a_misfit_is_said_also_where_figures_fail(tmp_path, broken, capsys):
-    args = ["identify", "acrobot_large", broken, "--no-pulleys", "--json"]
-    assert run(*args, "--out", tmp_path / "out") == 6
-    assert "not written: [Errno 28]" in printed(capsys).err
+    words = " ".join(words.split())
+    assert "acrobot_large: misfit" in words
+    assert "Largest residuals" in words
+    assert most["equation"] in words
 
 
 @pytest.mark.usefixtures("no_room_for_pictures")
 def test_figures_that_fail_cost_nothing_else(tmp_path, logs, capsys):
     out = tmp_path / "out"
-    args = ["identify", "acrobot_large", logs[0], "--no-pulleys", "--json", "--out", out]
-    assert run(*args) == 3
-    said, err = printed(capsys)
+    code, said, err = run(capsys, *identify(logs[0], out), "--json")
+    assert code == 3
     assert json.loads(said) == json.loads((out / "identification.json").read_text())
     assert load_robot(str(out / "robot.yaml"))
     assert "validation.png: not written: [Errno 28]" in err
@@ -132,31 +115,8 @@ def spoiled(kind):
 )
 def test_logs_that_cannot_tell_end_with_2(tmp_path, capsys, kind, words):
     path = write(tmp_path / "log.csv", *spoiled(kind))
-    out = tmp_path / "out"
-    args = ["identify", "acrobot_large", path, "--no-pulleys", "--out", str(out)]
-    assert run(*args) == 2
-    said = printed(capsys).err
-    assert words in said
-    assert said.count("\n") == 1
-    assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "empty log"),
-        ("time_s,C1_tension_n\n", "header without rows"),
-        ("time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n", "tensions: found none"),
-        ("time_s,C1_tension_n\n0,1\n1,2\n", "poses: found none"),
-        ("x_m,C1_tension_n\n0,nan\n", "found nan"),
-        ("C1_tension_n\n1\n", "time: found none"),
-    ],
-)
-def test_files_that_are_no_logs_end_with_2(tmp_path, capsys, text, words):
-    path = tmp_path / "log.csv"
-    path.write_text(text)
-    assert run("identify", "acrobot_large", path) == 2
-    assert words in printed(capsys).err
+    assert words in refuse(capsys, *identify(path, tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
@@ -171,10 +131,8 @@ def test_files_that_are_no_logs_end_with_2(tmp_path, capsys, text, words):
     ],
 )
 def test_impossible_requests_end_with_2(logs, capsys, options, words):
-    assert run("identify", "acrobot_large", logs[0], *options) == 2
-    assert words in printed(capsys).err
+    assert words in refuse(capsys, "identify", "acrobot_large", logs[0], *options)
 
 
 def test_a_planar_robot_is_refused(logs, capsys):
-    assert run("identify", "planar", logs[0]) == 2
-    assert "motion: found 2T1R" in printed(capsys).err
+    assert "motion: found 2T1R" in refuse(capsys, "identify", "planar", logs[0])

@@ -1,16 +1,13 @@
 """Every command that has a pose has one geometry, `--no-pulleys`, and names it in its result."""
 
-import json
 from dataclasses import replace
 
 import pytest
 import yaml
 
 import cdpr_drake as cdpr
-from cdpr_drake.cli.app import main
-from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot, robot_text
-from tests.messages import printed
+from tests.cli.commands import answer, told
 
 PLACE = "0.1,0.05,0.3"
 WITH, WITHOUT = "with pulleys of 20 mm", "pulleys ignored"
@@ -24,14 +21,6 @@ def wide(tmp_path_factory):
     path = tmp_path_factory.mktemp("robots") / "wide.yaml"
     path.write_text(yaml.safe_dump(text))
     return str(path)
-
-
-def run(capsys, *arguments):
-    with pytest.raises(SystemExit) as ended:
-        main([*arguments])
-    out, err = printed(capsys)
-    assert ended.value.code == 0, err
-    return out, err
 
 
 def commands(robot, out):
@@ -66,17 +55,14 @@ def test_a_command_with_a_pose_names_its_geometry(name, wide, tmp_path, capsys):
         out = tmp_path / words.replace(" ", "_")
         out.mkdir()
         line = commands(wide, out)[name]
-        text, _ = run(capsys, *line, *options)
-        assert words in " ".join(text.split())
-        told = json.loads(run(capsys, *line, *options, "--json")[0])
-        assert told["geometry"].startswith(words)
+        assert words in " ".join(answer(capsys, *line, *options).split())
+        assert told(capsys, *line, *options)["geometry"].startswith(words)
 
 
 @pytest.mark.parametrize("words", ["with pulleys of 4.5 mm", "no pulleys in the robot"])
 def test_a_robot_without_pulleys_is_told_so(words, capsys):
     name = "planar" if "4.5" in words else "kntu_planar"
-    told = json.loads(run(capsys, "tension", name, "--json")[0])
-    assert told["geometry"] == words
+    assert told(capsys, "tension", name)["geometry"] == words
 
 
 def test_pulleys_of_several_sizes_and_at_the_platform_are_named():
@@ -93,21 +79,22 @@ def test_pulleys_of_several_sizes_and_at_the_platform_are_named():
 
 def test_poses_that_are_enumerated_ignore_pulleys_and_say_why(capsys):
     home = load_robot("grab_three").home.position
-    told = cdpr.find_equilibria("grab_three", position=home).as_dict()
-    assert told["geometry"].startswith("pulleys ignored: all poses are found for cables from fixed")
+    words = cdpr.find_equilibria("grab_three", position=home).as_dict()["geometry"]
+    assert words.startswith("pulleys ignored: all poses are found for cables from fixed")
 
 
-def test_a_run_names_the_geometry_of_robot_and_controller():
-    for given, words in (
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
         ((), "pulleys ignored"),
-        (
-            ("cables.pulleys=true",),
-            "with pulleys of 4.5 mm; in the controller's model pulleys ignored",
-        ),
+        (("cables.pulleys=true",),
+         "with pulleys of 4.5 mm; in the controller's model pulleys ignored"),
         (("cables.pulleys=true", "controller.pulleys=true"), "with pulleys of 4.5 mm"),
-    ):
-        run = cdpr.simulate("acrobot_pbvs", ["duration=0.05", "camera.kind=projected", *given])
-        assert run.as_dict()["geometry"] == words
+    ],
+)  # fmt: skip
+def test_a_run_names_the_geometry_of_robot_and_controller(given, words):
+    run = cdpr.simulate("acrobot_pbvs", ["duration=0.05", "camera.kind=projected", *given])
+    assert run.as_dict()["geometry"] == words
 
 
 def test_a_wrench_is_given_moments_first_or_by_force_and_moment(capsys):
@@ -115,10 +102,10 @@ def test_a_wrench_is_given_moments_first_or_by_force_and_moment(capsys):
     parts = cdpr.solve_tensions("acrobot_large", force=[1.0, 2.0, 3.0], moment=[0.1, 0.2, 0.0])
     assert six.as_dict() == parts.as_dict()
     assert six.as_dict()["rows"][0] == "moment about x"
-    line = ("tension", "acrobot_large", "--json")
-    by_six = run(capsys, *line, "--wrench", "0.1,0.2,0,1,2,3")[0]
-    assert by_six == run(capsys, *line, "--force", "1,2,3", "--moment", "0.1,0.2,0")[0]
-    assert json.loads(by_six)["wrench_n_m_n"] == six.as_dict()["wrench_n_m_n"]
+    line = ("tension", "acrobot_large")
+    by_six = told(capsys, *line, "--wrench", "0.1,0.2,0,1,2,3")
+    assert by_six == told(capsys, *line, "--force", "1,2,3", "--moment", "0.1,0.2,0")
+    assert by_six["wrench_n_m_n"] == six.as_dict()["wrench_n_m_n"]
 
 
 @pytest.mark.parametrize(
@@ -137,20 +124,15 @@ def test_a_wrench_that_is_none_is_refused(given, words):
 
 def test_an_infeasible_answer_says_by_how_much(capsys):
     line = ("tension", "acrobot_large", "--force", "0,0,-600")
-    text = " ".join(run(capsys, *line)[0].split())
+    text = " ".join(answer(capsys, *line).split())
     assert "infeasible" in text
     assert "bounds missed by: " in text
     assert "wrench missed by: " in text
-    told = json.loads(run(capsys, *line, "--json")[0])["infeasible_by"]
-    assert told["beyond_bounds_n"] > 0.0
-    assert {one["bound"] for one in told["cables"]} == {"upper"}
-    assert told["missing_wrench"][5] < -1.0  # more weight than the cables take
+    missed = told(capsys, *line)["infeasible_by"]
+    assert missed["beyond_bounds_n"] > 0.0
+    assert {one["bound"] for one in missed["cables"]} == {"upper"}
+    assert missed["missing_wrench"][5] < -1.0  # more weight than the cables take
+    caroca = load_robot("caroca")
+    far = [caroca.frame.upper[0] - 0.05, caroca.home.position[1], caroca.frame.upper[2] - 0.05]
     with pytest.raises(cdpr.CdprError, match=r"bounds missed by .*C"):
-        cdpr.solve_static("caroca", pose=far(), model="elastic")
-
-
-def far():
-    """A pose of CAROCA that its cables do not hold, above the exit points' middle."""
-    home = load_robot("caroca").home.transform().translation()
-    upper = load_robot("caroca").frame.upper
-    return pose_from_angles([upper[0] - 0.05, home[1], upper[2] - 0.05], [0.0, 0.0, 0.0])
+        cdpr.solve_static("caroca", pose=far, model="elastic")

@@ -11,11 +11,10 @@ from cdpr_drake.analyses.front.simulation import simulate
 from cdpr_drake.analyses.front.studies import run_study
 from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
-from cdpr_drake.cli.app import main
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.errors import CdprError
 from cdpr_drake.systems.remote.server_socket import ServerSocket
-from tests.messages import printed
+from tests.cli.commands import run
 
 SCENARIO, TORQUES = "acrobot_pbvs", "acrobot_computed_torque"
 NOWHERE = "192.0.2.1"
@@ -63,20 +62,17 @@ NOWHERE = "192.0.2.1"
     ],
 )  # fmt: skip
 def test_python_reads_arguments_and_the_command_options(
-    call, arguments, python, command, tmp_path, monkeypatch, capsys
+    call, arguments, python, command, here, monkeypatch, capsys
 ):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "notes.txt").touch()
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    (here / "there").mkdir()
+    (here / "there" / "notes.txt").touch()
     with pytest.raises(CdprError) as refused:
         call()
     assert python in str(refused.value)
     assert "--" not in str(refused.value)
-    with pytest.raises(SystemExit) as ended:
-        main(arguments)
-    assert ended.value.code == 2
-    said = printed(capsys).err
-    assert command in said
+    code, _, said = run(capsys, *arguments)
+    assert (code, command in said) == (2, True)
     assert python not in said.replace(command, "")
 
 

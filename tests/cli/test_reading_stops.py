@@ -1,17 +1,20 @@
-"""Commands refuse in one line what would stop a reader, or the program."""
+"""Commands refuse in one line what would stop a reader, and escape names that steer terminals."""
 
 import os
+import shutil
 
 import pytest
+from rich.table import Table
 
 from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.motive import read_motive
-from cdpr_drake.cli import main
-from cdpr_drake.errors import LogFileError, RobotFileError
+from cdpr_drake.cli.terminal import message_console, wide_console
+from cdpr_drake.errors import LogFileError, RobotFileError, plain_words
 from cdpr_drake.models.formats.grab import read_grab
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.systems.scenarios.files import resolve_robot_path
 from tests.analyses.logs import recorders
+from tests.cli.commands import refuse, run
 from tests.messages import printed
 from tests.models.test_drake_parsing import urdf
 from tests.schema.test_hostile_text import BOMB, LONG
@@ -37,18 +40,15 @@ FILES = {
 
 @pytest.mark.parametrize("name", sorted(FILES))
 @pytest.mark.parametrize("command", ["check", "import", "tension"])
-def test_commands_say_a_line(command, name, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    content, words = FILES[name]
-    (tmp_path / name).write_text(content)
-    with pytest.raises(SystemExit) as end:
-        main([command, name])
-    out, err = printed(capsys)
-    assert end.value.code == 2
+def test_commands_say_a_line(command, name, here, capsys):
+    text, words = FILES[name]
+    (here / name).write_text(text)
+    code, out, err = run(capsys, command, name)
     said = out + err
+    assert code == 2
     assert any(each in said for each in words.split("|"))
     assert all(name in line for line in said.strip().split("\n"))
-    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert os.listdir(here) == [name]
 
 
 @pytest.mark.parametrize("lost", ["Position,Position,Position", "X,Y,Z,W", "Rotation,"])
@@ -76,59 +76,74 @@ def test_numbers_without_sense_are_refused_before_they_are_squared(tmp_path):
         read_grab(file)
 
 
+@pytest.mark.parametrize("command", ["check", "import", "import-log", "tension", "simulate"])
+def test_pipes_are_not_waited_for(command, here, capsys):
+    for name in ("pipe.yaml", "pipe.csv", "pipe.urdf", "pipe.mat", "pipe"):
+        os.mkfifo(name)
+        code, out, err = run(capsys, command, name)
+        assert (code, name in out + err) == (2, True), name
+
+
 @pytest.mark.parametrize(
     "words",
-    [
-        ["plan", "acrobot_large", "--path", "long.csv"],
-        ["calibrate", "acrobot_small", "long.csv"],
-        ["import-log", "long.csv", "--log-format", "csv"],
-        ["import", "long.csv"],
-    ],
-    ids=["plan", "calibrate", "import-log", "import"],
-)
-def test_cells_that_are_too_long_are_a_line(words, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "long.csv").write_text("time_s,C1_length_m,x_m\n0,1," + "9" * 200_000 + "\n")
-    with pytest.raises(SystemExit) as end:
-        main(words)
-    out, err = printed(capsys)
-    assert end.value.code == 2
-    assert "Traceback" not in out + err
-    assert "long.csv" in err
-    assert len(err.strip().split("\n")) == 1
-
-
-@pytest.mark.parametrize("name", ["pipe.yaml", "pipe.csv", "pipe.urdf", "pipe.mat", "pipe"])
-@pytest.mark.parametrize("command", ["check", "import", "import-log", "tension", "simulate"])
-def test_pipes_are_not_waited_for(command, name, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    os.mkfifo(name)
-    with pytest.raises(SystemExit) as end:
-        main([command, name])
-    out, err = printed(capsys)
-    assert end.value.code == 2
-    assert name in out + err
-
-
-def test_devices_are_not_read_to_their_end(monkeypatch, capsys):
-    for words in (["check", "/dev/zero"], ["import-log", "/dev/zero"], ["calibrate", "planar",
-                  "/dev/zero"], ["import-log", "x", "--mapping", "/dev/zero"]):  # fmt: skip
-        with pytest.raises(SystemExit) as end:
-            main(words)
-        assert end.value.code == 2
-    assert "/dev/zero" in printed(capsys).err
+    ["check /dev/zero", "import-log /dev/zero", "calibrate planar /dev/zero",
+     "import-log x --mapping /dev/zero"],
+)  # fmt: skip
+def test_devices_are_not_read_to_their_end(words, capsys):
+    code, out, err = run(capsys, *words.split())
+    assert code == 2
+    assert "/dev/zero" in out + err
 
 
 @pytest.mark.parametrize("command", ["calibrate", "identify"])
-def test_measurements_that_have_no_square_are_a_line(command, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_measurements_that_have_no_square_are_a_line(command, here, capsys):
     names = [f"C{k}_length_m" for k in range(1, 9)] + ["x_m", "y_m", "z_m"]
     rows = [[str(0.1 * t), *["1.0"] * 7, "1e300", *["0.1"] * 3] for t in range(5)]
     text = "\n".join(",".join(row) for row in [["time_s", *names], *rows])
-    (tmp_path / "log.csv").write_text(text + "\n")
-    with pytest.raises(SystemExit) as end:
-        main([command, "acrobot_small", "log.csv"])
-    err = printed(capsys).err
-    assert end.value.code == 2
-    assert err.startswith("cdpr: log.csv:2: C8_length_m: found 1e300; accepted: a number up to")
-    assert err.count("\n") == 1
+    (here / "log.csv").write_text(text + "\n")
+    said = refuse(capsys, command, "acrobot_small", "log.csv")
+    assert said.startswith("cdpr: log.csv:2: C8_length_m: found 1e300; accepted: a number up to")
+
+
+NASTY = "\x1b[31mred\x9b2J\u202e\x07"
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["check", f"{NASTY}.yaml"], 0),
+        (["check", f"no{NASTY}.yaml"], 2),
+        (["check", NASTY], 2),
+        (["tension", f"{NASTY}.yaml", "--pose", "0,0,9"], 2),
+        (["tension", f"{NASTY}.yaml", "--pose", "0,0,0.2", "--plot", f"{NASTY}.png"], 0),
+        (["import", f"{NASTY}.yaml"], 2),
+        (["export", f"{NASTY}.yaml", "--format", "urdf", "--out", NASTY], 0),
+        (["simulate", NASTY], 2),
+        (["simulate", "acrobot_pbvs", "--set", f"{NASTY}=1"], 2),
+        (["new", "robot", "--out", NASTY], None),
+        ([NASTY], 2),
+    ],
+)
+def test_commands_escape_names(words, code, here, capsys):
+    shutil.copy(robot_file("acrobot_small"), here / f"{NASTY}.yaml")
+    found, out, err = run(capsys, *words)
+    assert code is None or found == code
+    assert out + err == plain_words(out + err)
+    assert "\x1b" not in out + err
+    assert (out + err).strip()
+
+
+def test_tables_and_messages_escape_names(capsys):
+    table = Table(NASTY)
+    table.add_row(NASTY)
+    wide_console().print(table, f"results: {NASTY}")
+    message_console().print(f"cdpr: {NASTY}")
+    out, err = printed(capsys)
+    assert "\x1b" not in out + err
+    assert out.count(r"\x1b[31mred\x9b2J\u202e\x07") == 3
+    assert r"\x1b[31mred" in err
+
+
+@pytest.mark.parametrize("words", ["caf\u00e9 \u2212 1\u202f000\u00a0\u00b5m", "two\nlines\t1", ""])
+def test_plain_words_stay(words):
+    assert plain_words(words) == words

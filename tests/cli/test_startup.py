@@ -1,5 +1,6 @@
-"""Questions that need no robot import none of what robots need."""
+"""What a command imports before it answers, and how it refuses where it cannot start."""
 
+import ast
 import errno
 import os
 import subprocess
@@ -7,8 +8,9 @@ import sys
 
 import pytest
 
-from cdpr_drake.cli.app import SUBCOMMANDS, _first_line, main
-from tests.messages import messages, printed
+from cdpr_drake.cli.app import SUBCOMMANDS, _first_line
+from tests.cli.commands import run
+from tests.messages import messages
 
 WORDS = """
 import sys
@@ -18,31 +20,29 @@ try:
 except SystemExit:
     pass
 heavy = ("pydrake", "numba", "matplotlib", "cv2", "scipy", "distributed", "numpy", "rich")
-print("own:", len([name for name in sys.modules if name.startswith("cdpr_drake")]))
-print("imported:", [name for name in heavy if name in sys.modules], len(sys.modules))
+print("\\n", [name for name in heavy if name in sys.modules], ",", len(sys.modules))
 """
 
 MOST_MODULES = 400
 """Modules of Python and typer; with rich there are twice as many, with Drake above two thousand."""
-
 
 MOST_OF_OUR_OWN = 95
 """Modules of this package that `cdpr tension` imports, rooms included: methods, robots, geometry.
 Readers of other tools, cameras, mechanisms and equilibria are not among them."""
 
 
-def imported(*arguments):
-    words = WORDS.format(arguments=list(arguments))
-    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
-    rest, _, last = done.stdout.rpartition("imported: ")
-    names, _, count = last.rpartition(" ")
-    return names, int(count), int(rest.rpartition("own: ")[2])
+def said(program, *words, **options):
+    """What a Python program prints, and says on stderr."""
+    command = [sys.executable, "-c", program, *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, **options)
+    return done.stdout, messages(done.stderr)
 
 
 @pytest.mark.parametrize("arguments", [(), ("--help",), ("--version",)])
 def test_help_imports_nothing_heavy(arguments):
-    names, count, _ = imported(*arguments)
-    assert names == "[]"
+    out, _ = said(WORDS.format(arguments=list(arguments)))
+    names, count = ast.literal_eval(out.splitlines()[-1].strip())
+    assert names == []
     assert count < MOST_MODULES
 
 
@@ -54,39 +54,66 @@ def test_the_help_has_the_whole_first_line_of_each_subcommand():
         assert f" {name} {_first_line(name, where)}".replace("\n", " ") in help_text
 
 
-def test_a_question_about_tensions_draws_nothing():
-    names, _, own = imported("tension", "acrobot_small", "--pose", "0,0,0.3")
-    assert "matplotlib" not in names
-    assert own <= MOST_OF_OUR_OWN
-
-
-def test_garbage_is_searched_for_but_not_among_what_was_imported():
-    """Two hundred thousand objects stay; a search through them takes a tenth of a second."""
-    words = """
+PROGRAM = """
 import gc, sys
 import cdpr_drake.cli.app as app
-def seen(*arguments, **options):
-    print("searches:", gc.isenabled(), "left alone:", gc.get_freeze_count() > 100_000)
-app.typer.Typer.__call__ = seen
-sys.argv = ["cdpr", "tension", "planar"]
-app.main()
-"""
-    command = [sys.executable, "-c", words]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout == "searches: True left alone: True\n"
 
+def end(words):
+    sys.argv = ["cdpr", *words]
+    try:
+        app.main()
+    except SystemExit as end:
+        assert not end.code
 
-WORKSPACE = """
-import sys
+found = {}
+end(["tension", "acrobot_small", "--pose", "0,0,0.3"])
+found["tension"] = {
+    "figures": "matplotlib" in sys.modules,
+    "own": sum(name.startswith("cdpr_drake") for name in sys.modules),
+}
 import cdpr_drake.analyses.workspaces.workspace_scene
 import cdpr_drake.cli.workspace
-print([name for name in sys.modules if name.endswith("visual_servo_scenario")])
+found["servos"] = [name for name in sys.modules if name.endswith("visual_servo_scenario")]
+end(["view", "planar", "--html", "robot.html"])
+call = app.typer.Typer.__call__
+
+def seen(*arguments, **options):
+    found["searches"] = gc.isenabled(), gc.get_freeze_count() > 100_000
+    return call(*arguments, **options)
+
+app.typer.Typer.__call__ = seen
+end(["--version"])
+print(found)
 """
 
 
-def test_a_workspace_is_drawn_without_what_servos_are_made_of():
-    command = [sys.executable, "-c", WORKSPACE]
-    assert subprocess.check_output(command, text=True) == "[]\n"
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    """Of one process: what it imported, the lines that it printed, and its stderr."""
+    out, err = said(PROGRAM, cwd=tmp_path_factory.mktemp("there"))
+    *lines, found = out.splitlines()
+    return ast.literal_eval(found), lines, err
+
+
+def test_a_question_about_tensions_draws_nothing(program):
+    tension = program[0]["tension"]
+    assert not tension["figures"]
+    assert tension["own"] <= MOST_OF_OUR_OWN
+
+
+def test_a_workspace_is_drawn_without_what_servos_are_made_of(program):
+    assert program[0]["servos"] == []
+
+
+def test_garbage_is_searched_for_but_not_among_what_was_imported(program):
+    """Two hundred thousand objects stay; a search through them takes a tenth of a second."""
+    assert program[0]["searches"] == (True, True)
+
+
+def test_drake_is_silent_although_it_is_imported_late(program):
+    _, lines, err = program
+    assert lines[-2] == "robot.html"  # the last one is the version
+    assert not err
 
 
 def test_a_locale_without_utf_8_is_said_in_one_line():
@@ -104,14 +131,5 @@ def test_what_the_system_refuses_is_one_line(capsys, monkeypatch):
         raise OSError(errno.ENOSPC, "No space left on device", "log.npz")
 
     monkeypatch.setattr("cdpr_drake.cli.robots.load_robot", full)
-    with pytest.raises(SystemExit) as ended:
-        main(["robots"])
-    assert ended.value.code == 2
-    assert printed(capsys).err == "cdpr: log.npz: No space left on device\n"
-
-
-def test_drake_is_silent_although_it_is_imported_late(tmp_path):
-    command = [sys.executable, "-m", "cdpr_drake", "view", "planar", "--html", "robot.html"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout == "robot.html\n"
-    assert not messages(done.stderr)
+    code, _, err = run(capsys, "robots")
+    assert (code, err) == (2, "cdpr: log.npz: No space left on device\n")

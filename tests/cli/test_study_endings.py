@@ -1,8 +1,11 @@
-"""How `cdpr study` and `cdpr reproduce` end when something fails late or they are stopped."""
+"""`cdpr study` and `cdpr reproduce`: how they end, late failures and stops included, and go on."""
 
 import errno
 import json
+import shlex
 import signal
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,14 +15,22 @@ import pytest
 from cdpr_drake.analyses.front import reproduction
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.progress import WorkProgress
+from cdpr_drake.analyses.reproduction import digest_pdf
 from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, MET_FITTED
 from cdpr_drake.analyses.sweeps.sweep import run_study_sweep
 from cdpr_drake.analyses.visualization.figure_files import write_figures
 from cdpr_drake.analyses.visualization.figure_style import new_figure
-from cdpr_drake.cli.app import main
 from cdpr_drake.cli.process import StopRequest
+from cdpr_drake.cli.study import _command
 from cdpr_drake.errors import CdprError
+from tests.cli import commands
 from tests.messages import printed
+
+ROOT = Path(__file__).parents[2]
+SQUARES = [0.0, 1.0, 4.0, 9.0]
+STUDY, REPRODUCE = ("study", "toy", "--out", "r"), ("reproduce", "--only", "toy", "--out", "r")
+BOTH = pytest.mark.parametrize("asked", [STUDY, REPRODUCE], ids=["study", "reproduce"])
 
 
 class Squares:
@@ -27,6 +38,9 @@ class Squares:
 
     def __call__(self, start, stop):
         return {"squares": np.arange(start, stop) ** 2.0}
+
+
+SQUARE = Squares.__call__
 
 
 def good_figure():
@@ -39,7 +53,7 @@ def bad_figure():
     raise ValueError("no such colour\nat all")
 
 
-DRAWN = {"bad": bad_figure, "good": good_figure}
+DRAWN = {"first": good_figure, "good": good_figure}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,118 +84,196 @@ def study_toy(quick, session):
 
 
 @pytest.fixture(autouse=True)
-def _toy(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def _toy(monkeypatch, here):
     monkeypatch.setenv("COLUMNS", "400")
     monkeypatch.setitem(STUDIES, "toy", StudyEntry(study_toy))
 
 
 @pytest.fixture
+def spoiled(monkeypatch):
+    """The first figure of the study cannot be drawn."""
+    monkeypatch.setitem(DRAWN, "first", bad_figure)
+
+
+@pytest.fixture
 def run(capsys):
     """Runs a command; returns exit code, stdout and stderr."""
-
-    def command(*arguments):
-        with pytest.raises(SystemExit) as ended:
-            main([*arguments, "--workers", "1"])
-        out, err = printed(capsys)
-        return ended.value.code, out, err
-
-    return command
+    return lambda *words: commands.run(capsys, *words, "--workers", "1")
 
 
 @pytest.fixture
 def stopped(run, monkeypatch):
     """The same, where Ctrl-C comes after two items."""
 
-    def command(*arguments):
+    def command(*words):
         asked = iter(range(2))
         with monkeypatch.context() as patch:
             patch.setattr(StopRequest, "__call__", lambda self: next(asked, None) is None)
-            return run(*arguments)
+            return run(*words)
 
     return command
+
+
+@pytest.fixture
+def disturbed(monkeypatch):
+    """Lets something happen before an item is computed; a function of the item's number."""
+    return lambda event: monkeypatch.setattr(
+        Squares, "__call__", lambda self, start, stop: event(start) or SQUARE(self, start, stop)
+    )
 
 
 def results(folder):
     return json.loads((folder / "results.json").read_text())
 
 
-def test_a_figure_that_fails_is_named_and_costs_no_other(run, tmp_path):
-    code, _, err = run("study", "toy", "--out", "r")
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def report(folder):
+    """The page, whole."""
+    words = (folder / "report.html").read_text()
+    assert words.endswith("</main></body></html>\n")
+    assert [name for name in names(folder) if ".part-" in name] == []
+    return words
+
+
+def test_a_figure_that_fails_is_named_and_costs_no_other(run, spoiled, here):
+    code, _, err = run(*STUDY)
     assert code == 3
-    assert "cdpr: r/bad.png: not written: no such colour\n" in err
+    assert "cdpr: r/first.png: not written: no such colour\n" in err
     assert "The data is complete in r" in err
-    assert results(tmp_path / "r")["squares"] == [0.0, 1.0, 4.0, 9.0]
-    there = sorted(path.name for path in (tmp_path / "r").iterdir())
-    assert there == [".cdpr_drake.json", "arguments.json", "good.png", "parts.npz", "results.json"]
+    assert results(here / "r")["squares"] == SQUARES
+    made = [".cdpr_drake.json", "arguments.json", "good.png", "parts.npz", "results.json"]
+    assert names(here / "r") == made
 
 
-def test_an_interrupted_study_names_its_missing_figures_too(stopped):
-    code, _, err = stopped("study", "toy", "--out", "r")
+def test_figures_have_the_formats_asked_for_also_when_it_goes_on(run, here):
+    assert run(*STUDY, "--format", "pdf,png")[0] == 0
+    assert {"good.pdf", "good.png", "first.pdf"} < set(names(here / "r"))
+    words = _command("toy", "o", True, False, ("pdf", "svg"))
+    assert words == "cdpr study toy --out o --quick --format pdf,svg"
+    assert "--format" not in _command("toy", "o", True, False, ("png",))
+
+
+def test_an_interrupted_study_names_its_missing_figures_too(stopped, spoiled):
+    code, _, err = stopped(*STUDY)
     assert code == 130
     assert "to continue:\ncdpr study toy --out r" in err
-    assert "r/bad.png: not written" in err
+    assert "r/first.png: not written" in err
+
+
+def test_an_interrupted_study_names_the_command_that_continues_it(run, stopped, here):
+    code, out, err = stopped("study", "toy", "--quick", "--json")
+    assert code == 130
+    assert json.loads(out)["interrupted"]
+    command = shlex.split(err.strip().splitlines()[-1])
+    assert command[:3] == ["cdpr", "study", "toy"]
+    assert results(here / "studies" / "toy")["interrupted"]
+    code, out, err = run(*command[1:])
+    assert code == 0
+    assert "2 of 4 items were there already" in err
+    assert json.loads(out)["squares"] == SQUARES
+    code, again, err = run(*command[1:])
+    assert "complete already, nothing was computed" in err
+    assert again == out
+
+
+def test_other_arguments_are_refused_and_overwrite_begins_anew(run, stopped, here):
+    asked = ("study", "toy", "--out", "a [b]")
+    stopped(*asked, "--quick")
+    kept = names(here / "a [b]" / "chunks")
+    assert len(kept) == 2
+    code, _, err = run(*asked)
+    assert code == 2
+    assert "quick is true there, false here" in err
+    assert len(err.strip().splitlines()) == 1
+    assert names(here / "a [b]" / "chunks") == kept
+    _, _, err = stopped(*asked, "--quick", "--overwrite")
+    assert "were there already" not in err
+    words = shlex.split(err.strip().splitlines()[-1])
+    assert words == ["cdpr", *asked, "--quick", "--workers", "1"]
+    (here / "r").mkdir()
+    (here / "r" / "thesis.txt").write_text("x")
+    code, _, err = run(*STUDY)
+    assert (code, names(here / "r")) == (2, ["thesis.txt"])
+    assert "holds files already" in err
+
+
+KILLED = commands.killed_after(
+    2,
+    commands.STORE,
+    f"""
+sys.path.append({str(ROOT)!r})
+from tests.cli.test_study_endings import STUDIES, StudyEntry, study_toy
+STUDIES["toy"] = StudyEntry(study_toy)
+""",
+)
+
+
+def test_a_killed_study_continues(run, here):
+    # In one process; workers that are left behind: `test_a_killed_sweep_continues_and_says_so`.
+    words = [sys.executable, "-c", KILLED, *STUDY, "--workers", "1"]
+    assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
+    assert not (here / "r" / "results.json").exists()
+    code, _, err = run(*STUDY)
+    assert (code, "2 of 4 items were there already" in err) == (0, True)
+    assert results(here / "r")["squares"] == SQUARES
 
 
 def test_a_reproduction_says_which_figures_are_missing_and_tries_again(run, monkeypatch):
-    asked = ("reproduce", "--only", "toy", "--out", "r")
-    code, _, err = run(*asked)
+    with monkeypatch.context() as patch:
+        patch.setitem(DRAWN, "first", bad_figure)
+        code, _, err = run(*REPRODUCE)
     assert code == 3
-    assert "cdpr: toy: the data is complete; not written: bad.png: no such colour" in err
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
-    code, _, err = run(*asked)
+    assert "cdpr: toy: the data is complete; not written: first.png: no such colour" in err
+    code, _, err = run(*REPRODUCE)
     assert (code, "taken over" in err) == (0, False)
-    code, _, err = run(*asked)
+    code, _, err = run(*REPRODUCE)
     assert (code, "taken over" in err) == (0, True)
 
 
 def test_older_numbers_do_not_stand_for_those_that_could_not_be_written(
-    run, stopped, monkeypatch, tmp_path
+    run, stopped, monkeypatch, here
 ):
-    stopped("study", "toy", "--out", "r")
+    stopped(*STUDY)
 
     def full(path, found):
         raise OSError(28, "No space left on device", str(path))
 
     with monkeypatch.context() as patch:
         patch.setitem(globals(), "write_json", full)
-        code, _, err = run("study", "toy", "--out", "r")
-    assert code == 2
+        code, _, err = run(*STUDY)
+    assert (code, "complete" in err) == (2, False)
     assert "No space left on device" in err
-    assert "complete" not in err
-    code, _, err = run("study", "toy", "--out", "r")
-    assert "complete already, nothing was computed" in err
-    assert not results(tmp_path / "r")["interrupted"]
+    assert "complete already, nothing was computed" in run(*STUDY)[2]
+    assert not results(here / "r")["interrupted"]
 
 
-def test_what_stops_early_does_not_cost_the_older_results(run, stopped, tmp_path):
-    run("study", "toy", "--out", "r")
-    stopped("study", "toy", "--out", "r", "--overwrite")
-    assert results(tmp_path / "r")["interrupted"]
-    assert results(tmp_path / "r-before")["squares"] == [0.0, 1.0, 4.0, 9.0]
-    run("study", "toy", "--out", "r", "--overwrite")
-    assert not results(tmp_path / "r")["interrupted"]
+def test_what_stops_early_does_not_cost_the_older_results(run, stopped, here):
+    run(*STUDY)
+    stopped(*STUDY, "--overwrite")
+    assert results(here / "r")["interrupted"]
+    assert results(here / "r-before")["squares"] == SQUARES
+    run(*STUDY, "--overwrite")
+    assert not results(here / "r")["interrupted"]
 
 
-@pytest.mark.parametrize(
-    "command", [["study", "toy"], ["reproduce", "--only", "toy"]], ids=["study", "reproduce"]
-)
-def test_overwrite_keeps_what_is_not_cdprs_own_and_names_it(run, monkeypatch, tmp_path, command):
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
-    run(*command, "--out", "r")
-    _, _, err = run(*command, "--out", "r", "--overwrite")
-    assert "Kept" not in err
-    assert [path.name for path in tmp_path.iterdir()] == ["r"]
-    (tmp_path / "r" / "notes.txt").write_text("years")
-    code, _, err = run(*command, "--out", "r", "--overwrite")
+@BOTH
+def test_overwrite_keeps_what_is_not_cdprs_own_and_names_it(run, here, asked):
+    run(*asked)
+    assert "Kept" not in run(*asked, "--overwrite")[2]
+    assert names(here) == ["r"]
+    (here / "r" / "notes.txt").write_text("years")
+    code, _, err = run(*asked, "--overwrite")
     assert code == 0
     assert "Kept in r-kept: notes.txt: not written by cdpr" in err
-    assert [path.name for path in (tmp_path / "r-kept").iterdir()] == ["notes.txt"]
+    assert names(here / "r-kept") == ["notes.txt"]
 
 
 @pytest.mark.parametrize("begun", [False, True])
-def test_what_fails_says_where_the_older_results_are(run, monkeypatch, tmp_path, begun):
-    run("study", "toy", "--out", "r")
+def test_what_fails_says_where_the_older_results_are(run, monkeypatch, here, begun):
+    run(*STUDY)
 
     def failing(quick, session):
         if begun:
@@ -189,35 +281,24 @@ def test_what_fails_says_where_the_older_results_are(run, monkeypatch, tmp_path,
         raise CdprError("no graphics here")
 
     monkeypatch.setitem(STUDIES, "toy", StudyEntry(failing))
-    code, _, err = run("study", "toy", "--out", "r", "--overwrite")
+    code, _, err = run(*STUDY, "--overwrite")
     assert (code, "no graphics here" in err) == (2, True)
-    kept = tmp_path / ("r-before" if begun else "r")
-    assert results(kept)["squares"] == [0.0, 1.0, 4.0, 9.0]
+    assert results(here / ("r-before" if begun else "r"))["squares"] == SQUARES
     assert ("older results are in" in err) == begun
 
 
-@pytest.mark.parametrize("command", [["study", "toy"], ["reproduce", "--only", "toy"]])
-def test_a_second_ctrl_c_ends_it_at_once_and_says_what_is_kept(run, monkeypatch, command):
-    store = Squares.__call__
+def test_a_study_that_fails_is_named_and_so_is_the_exit_code(run, monkeypatch):
+    def broken(quick, session):
+        raise RuntimeError("no such thing")
 
-    def twice(self, start, stop):
-        if start == 2:
-            signal.raise_signal(signal.SIGINT)
-            signal.raise_signal(signal.SIGINT)
-        return store(self, start, stop)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Squares, "__call__", twice)
-        code, _, err = run(*command, "--out", "r")
-    assert code == 130
-    assert "what was finished is kept in" in err
-    assert err.count("kept in") == 1
-    code, _, err = run(*command, "--out", "r")
-    assert code == 3
-    assert "2 of 4 items were there already" in err or "continued: it was stopped before" in err
+    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(broken))
+    code, out, err = run("reproduce", "--only", "case-8", "--out", "r")
+    assert code == 5
+    assert "cdpr: study failed: case-8: RuntimeError: no such thing" in err
+    assert "study failed" in out
 
 
-def interrupting(number, times, then):
+def interrupting(number, times, then=lambda: None):
     """What sends a signal to this process some times before it does something."""
 
     def call(*arguments):
@@ -228,160 +309,121 @@ def interrupting(number, times, then):
     return call
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("command", [["study", "toy"], ["reproduce", "--only", "toy"]])
-def test_the_first_ctrl_c_is_answered_at_once(capfd, monkeypatch, command, number):
+@BOTH
+def test_a_second_ctrl_c_ends_it_at_once_and_says_what_is_kept(run, disturbed, asked):
+    disturbed(lambda item: item == 2 and interrupting(signal.SIGINT, 2)())
+    code, _, err = run(*asked)
+    assert code == 130
+    assert "what was finished is kept in" in err
+    assert err.count("kept in") == 1
+    disturbed(lambda item: None)
+    code, _, err = run(*asked)
+    assert code == 0
+    assert "2 of 4 items were there already" in err or "continued: it was stopped before" in err
+
+
+@pytest.mark.parametrize(("asked", "number"), [(STUDY, signal.SIGTERM), (REPRODUCE, signal.SIGINT)])
+def test_the_first_ctrl_c_is_answered_at_once(capfd, disturbed, asked, number):
     """Before what is under way has ended, which may take a minute."""
     seen = []
 
-    def looked_at(self, start, stop):
-        if start == 2:
+    def looked_at(item):
+        if item == 2:
             printed(capfd)
             signal.raise_signal(number)
             seen.append(printed(capfd).err)
-        return squares(self, start, stop)
 
-    squares = Squares.__call__
-    monkeypatch.setattr(Squares, "__call__", looked_at)
-    with pytest.raises(SystemExit):
-        main([*command, "--out", "r", "--workers", "1"])
+    disturbed(looked_at)
+    commands.ended(*asked, "--workers", "1")
     (line,) = seen[0].splitlines()
     assert line.startswith("Stopping: waits for what")
     assert "Ctrl-C again ends" in line
 
 
-def report(folder):
-    """The page, whole."""
-    words = (folder / "report.html").read_text()
-    assert words.endswith("</main></body></html>\n")
-    assert [path.name for path in folder.iterdir() if ".part-" in path.name] == []
-    return words
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_second_ctrl_c_ends_the_study_and_the_report_has_what_is_there(
-    run, monkeypatch, tmp_path, number
+    run, monkeypatch, disturbed, here, number
 ):
     monkeypatch.setitem(STUDIES, "more", StudyEntry(study_toy))
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
+    asked = ("reproduce", "--only", "toy,more", "--out", "r")
     begun = []
 
-    def twice(self, start, stop):
-        begun.append(start)
+    def twice(item):
+        begun.append(item)
         if len(begun) == 7:  # in the second study
-            interrupting(number, 2, lambda: None)()
-        return squares(self, start, stop)
+            interrupting(number, 2)()
 
-    squares = Squares.__call__
-    with monkeypatch.context() as patch:
-        patch.setattr(Squares, "__call__", twice)
-        code, _, err = run("reproduce", "--only", "toy,more", "--out", "r")
+    disturbed(twice)
+    code, _, err = run(*asked)
     assert code == 130
     assert "toy: finished" in err
     assert "more: stopped" in err
-    assert ">finished<" in report(tmp_path / "r")
-    assert ">stopped<" in report(tmp_path / "r")
-    code, _, err = run("reproduce", "--only", "toy,more", "--out", "r")
-    assert code == 0
-    assert ">stopped<" not in report(tmp_path / "r")
+    assert ">finished<" in report(here / "r")
+    assert ">stopped<" in report(here / "r")
+    assert run(*asked)[0] == 0
+    assert ">stopped<" not in report(here / "r")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("before", [0, 1])
+@pytest.mark.parametrize(("number", "before"), [(signal.SIGINT, 0), (signal.SIGTERM, 1)])
 def test_a_signal_while_the_report_is_written_does_not_cost_it(
-    run, monkeypatch, tmp_path, number, before
+    run, monkeypatch, disturbed, here, number, before
 ):
     """Also where one has asked the studies to stop already."""
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
-    squares = Squares.__call__
-    monkeypatch.setattr(Squares, "__call__", interrupting(number, before, squares))
+    disturbed(lambda item: interrupting(number, before)())
     write = reproduction.write_report
     monkeypatch.setattr(reproduction, "write_report", interrupting(number, 1, write))
-    code, _, _ = run("reproduce", "--only", "toy", "--out", "r")
-    assert code == 130 * before
-    assert (">stopped<" if before else ">finished<") in report(tmp_path / "r")
+    assert run(*REPRODUCE)[0] == 130 * before
+    assert (">stopped<" if before else ">finished<") in report(here / "r")
 
 
-def test_a_report_that_is_dropped_leaves_the_one_before(run, monkeypatch, tmp_path):
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
-    run("reproduce", "--only", "toy", "--out", "r")
-    whole = report(tmp_path / "r")
+def test_a_report_that_is_dropped_leaves_the_one_before(run, monkeypatch, here):
+    run(*REPRODUCE)
+    whole = report(here / "r")
     write = Path.write_text
 
     def half(path, words, **options):
         if "report.html" in path.name:
             write(path, words[: len(words) // 2], **options)
-            interrupting(signal.SIGINT, 2, lambda: None)()
+            interrupting(signal.SIGINT, 2)()
         return write(path, words, **options)
 
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_text", half)
-        code, _, err = run("reproduce", "--only", "toy", "--out", "r")
+    monkeypatch.setattr(Path, "write_text", half)
+    code, _, err = run(*REPRODUCE)
     assert code == 130
     assert "cdpr: stopped; what was finished is kept in" in err
-    assert report(tmp_path / "r") == whole
+    assert report(here / "r") == whole
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_while_figures_are_written_lets_them_be_written(
-    run, monkeypatch, tmp_path, number
-):
-    def signalled():
-        signal.raise_signal(number)
-        return good_figure()
-
-    monkeypatch.setitem(DRAWN, "bad", signalled)
-    code, _, _ = run("study", "toy", "--out", "r")
-    assert code == 0
-    assert (tmp_path / "r" / "bad.png").exists()
+def test_a_signal_while_figures_are_written_lets_them_be_written(run, monkeypatch, here, number):
+    monkeypatch.setitem(DRAWN, "first", interrupting(number, 1, good_figure))
+    assert run(*STUDY)[0] == 0
+    assert {"first.png", "good.png"} < set(names(here / "r"))
 
 
-@pytest.mark.parametrize(
-    ("option", "value"),
-    [("--seeds", "5:5"), ("--seeds", "-1"), ("--seeds", "0"), ("--seeds", "1000000000000"),
-     ("--workers", "0"), ("--workers", "-3")],
-)  # fmt: skip
-def test_numbers_out_of_range_are_refused_before_anything_is_written(
-    capsys, tmp_path, option, value
-):
-    with pytest.raises(SystemExit) as ended:
-        main(["study", "fusion", "--quick", "--out", "r", option, value])
-    said = printed(capsys).err
-    assert ended.value.code == 2
-    assert option in said
-    assert value in said
-    assert len(said.strip().splitlines()) == 1
-    assert not any(tmp_path.iterdir())
-
-
-def test_a_damaged_results_file_is_made_again_and_spoils_no_report(run, monkeypatch, tmp_path):
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
-    asked = ("reproduce", "--only", "toy", "--out", "r")
-    run(*asked)
-    damaged = tmp_path / "r" / "studies" / "toy" / "results.json"
+def test_a_damaged_results_file_is_made_again_and_spoils_no_report(run, here):
+    run(*REPRODUCE)
+    damaged = here / "r" / "studies" / "toy" / "results.json"
     damaged.write_text('{"squares": [0.')
-    code, _, err = run(*asked)
+    code, _, err = run(*REPRODUCE)
     assert (code, "taken over" in err) == (0, False)
-    assert results(damaged.parent)["squares"] == [0.0, 1.0, 4.0, 9.0]
+    assert results(damaged.parent)["squares"] == SQUARES
 
 
-def test_a_reproduction_does_not_mix_with_results_of_a_study(run, tmp_path):
-    run("study", "toy", "--out", "r")
-    before = sorted(tmp_path.rglob("*"))
-    code, _, err = run("reproduce", "--only", "toy", "--out", "r")
+def test_a_reproduction_does_not_mix_with_results_of_a_study(run, here):
+    run(*STUDY)
+    before = sorted(here.rglob("*"))
+    code, _, err = run(*REPRODUCE)
     assert (code, "cdpr reproduce did not write" in err) == (2, True)
-    assert sorted(tmp_path.rglob("*")) == before
+    assert sorted(here.rglob("*")) == before
 
 
-def test_a_disk_that_is_full_at_any_write_costs_nothing_that_was_finished(
-    run, monkeypatch, tmp_path
-):
-    monkeypatch.setitem(DRAWN, "bad", good_figure)
+def test_a_disk_that_is_full_at_any_write_costs_nothing_that_was_finished(run, monkeypatch, here):
     run("study", "toy", "--out", "whole")
-    wanted = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
+    wanted = {path.name: path.read_bytes() for path in (here / "whole").iterdir()}
     replace, codes = Path.replace, []
     for failing in range(1, 20):
-        folder, left = tmp_path / f"r{failing}", iter(range(1, failing))
+        folder, left = here / f"r{failing}", iter(range(1, failing))
 
         def full(part, target, left=left):
             if next(left, None) is None:
@@ -394,14 +436,74 @@ def test_a_disk_that_is_full_at_any_write_costs_nothing_that_was_finished(
         codes.append(code)
         assert code == 0 or "No space left on device" in err
         assert "Traceback" not in err
-        stored = 0 if not (folder / "chunks").is_dir() else len(list((folder / "chunks").iterdir()))
+        stored = 0 if not (folder / "chunks").is_dir() else len(names(folder / "chunks"))
         joined = failing > 7  # the four chunks, which are one file from then on
         assert (folder / "parts.npz").exists() == joined
         assert stored == (0 if joined else max(0, failing - 3))
-        code, _, err = run("study", "toy", "--out", folder.name)
-        assert code == 0
-        there = {path.name: path.read_bytes() for path in folder.iterdir()}
-        assert there == wanted
+        assert run("study", "toy", "--out", folder.name)[0] == 0
+        assert {path.name: path.read_bytes() for path in folder.iterdir()} == wanted
         if codes[-1] == 0:
             break
     assert codes == [2] * 8 + [3] * 2 + [0]  # marker, arguments, chunks, parts, numbers; figures
+
+
+def test_without_reportlab_the_rest_is_there_and_a_line_says_so(run, monkeypatch, here):
+    monkeypatch.setattr(digest_pdf, "find_spec", lambda name: None)
+    code, _, err = run(*REPRODUCE)
+    assert code == 0
+    words = "digest.pdf was not written: reportlab is not installed: pip install 'cdpr_drake"
+    assert err.count(words) == 1
+    assert report(here / "r")
+    assert "digest.pdf" not in names(here / "r")
+
+
+def test_a_digest_that_fails_is_named_and_the_rest_is_there(run, monkeypatch, here):
+    def without_room():
+        def full(path, story):
+            raise OSError(28, "No space left on device")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(reproduction, "write_digest", full)
+            return run(*REPRODUCE)
+
+    code, _, err = without_room()
+    assert code == 3
+    assert "cdpr: digest.pdf was not written: [Errno 28] No space left on device" in err
+    assert {"report.html", "summary.json"} < set(names(here / "r"))
+    assert not [name for name in names(here / "r") if "digest" in name]
+    assert run(*REPRODUCE)[0] == 0
+    assert "digest.pdf" in names(here / "r")
+    assert "(the one that is there is of an earlier report)" in without_room()[2]
+
+
+REAL, ASKED = "worked-examples", ("worked-examples", "toy")
+
+
+def test_a_study_as_it_is_beside_another_and_again(run, here):
+    asked = ("reproduce", "--quick", "--only", ",".join(ASKED), "--out", "r")
+    code, out, _ = run(*asked, "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert [state["status"] for state in found["studies"]] == ["finished"] * 2
+    mine = [item for item in found["items"] if REAL in item["studies"]]
+    judged = {"confirmed", "in part", "not confirmed", "not testable", "shown"}
+    judged |= {MET_CONSTRUCTION, MET_FITTED}
+    assert {item["verdict"] for item in mine} - {"not judged"} <= judged  # the quick form judges
+    assert "missing" not in found["scorecard"]["all"]
+    assert json.loads((here / "r" / "summary.json").read_text()) == found
+    page = report(here / "r")
+    drawn = {(item["source"], path) for item in found["items"] for path in item["figures"]}
+    assert page.count("<figure id=") == len(drawn)  # once for each thesis that has it
+    for name in ASKED:
+        assert (here / "r" / "studies" / name / "results.json").is_file()
+    code, out, err = run(*asked, "--beside", "r")
+    assert code == 0
+    assert err.count("finished before by the same code, taken over") == 2
+    assert "2 studies, report:" in out
+    assert "digest:" in out
+    assert (here / "r" / "digest.pdf").read_bytes().startswith(b"%PDF-")
+    assert "<small>was" not in page
+    assert "0 facts have another verdict, 0 are new, 0 are" in report(here / "r")
+    code, _, err = run("reproduce", "--only", REAL, "--out", "r")
+    assert code == 2
+    assert "holds a reproduction in the quick form, the full form is asked for" in err

@@ -1,7 +1,13 @@
-"""Every key and every name that a page puts in backticks is there."""
+"""What pages name is there: keys, names, rooms, studies, and answers to a stranger's questions."""
+
+import re
+import runpy
+import sys
+from importlib import import_module
 
 import pytest
 
+from cdpr_drake.analyses.studies.catalogue import STUDIES
 from tests.docs.names import ROOT, unknown_names
 
 PAGES = sorted(
@@ -9,6 +15,9 @@ PAGES = sorted(
         "README", "ARCHITECTURE", "CONTRIBUTING",
     ))]
 )  # fmt: skip
+QUESTIONS = (ROOT / "docs" / "howto" / "where_is_what.md").read_text()
+ROW = re.compile(r"^\| (.+\?) \| `(\S+)\.py` \| `(\w+)` \|$", re.MULTILINE)
+ROWS = ROW.findall(QUESTIONS)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
@@ -32,3 +41,50 @@ def test_what_is_not_there_is_found(span):
 )  # fmt: skip
 def test_what_is_there_is_not(span):
     assert list(unknown_names(f"Some words, `{span}`.\n\n```python\nno.such_thing()\n```\n")) == []
+
+
+def test_the_picture_and_the_list_of_rooms_are_made_from_the_code(monkeypatch, capsys):
+    program = str(ROOT / "docs" / "rooms.py")
+    monkeypatch.setattr(sys, "argv", [program, "--check"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(program, run_name="__main__")
+    assert (ended.value.code, capsys.readouterr().out) == (0, "")
+
+
+def studies():
+    """Names in the guide's first column; endings such as `-ibvs` behind the first of their row."""
+    guide = ROOT / "docs" / "guides" / "studies.md"
+    for line in guide.read_text(encoding="utf-8").splitlines():
+        if line.startswith("| `") and "`cdpr study`" not in line:
+            first, *others = re.findall(r"`([^`]+)`", line.split("|")[1])
+            yield first
+            yield from (f"{first}{other}" if other.startswith("-") else other for other in others)
+
+
+def test_the_guide_s_table_has_every_study():
+    cases = {f"case-{number}" for number in range(1, 11)}  # "`case-1` to `case-10`"
+    assert {*studies(), *cases} == set(STUDIES)
+
+
+def defines(path, name):
+    """Whether a module of the package has a name of its own, not one that it imports."""
+    words = path.split("/")
+    home = ".".join(words if words[0] == "cdpr_drake" else ["cdpr_drake", *words])
+    found = getattr(import_module(home), name, None)
+    return found is not None and getattr(found, "__module__", home) == home
+
+
+def test_every_row_of_a_stranger_s_table_is_a_question():
+    assert len(ROWS) >= 20
+    assert QUESTIONS.count("\n| ") == len(ROWS) + 1  # and the head of the table
+
+
+@pytest.mark.parametrize(("question", "path", "name"), ROWS, ids=[row[2] for row in ROWS])
+def test_the_answer_is_there(question, path, name):
+    assert (ROOT / f"{path}.py").is_file()
+    assert defines(path, name), f"{path} does not define {name}"
+
+
+@pytest.mark.parametrize("name", ["CableSet", "Kinematics"])
+def test_what_is_only_imported_does_not_count(name):
+    assert not defines("cdpr_drake/statics/forward_kinematics", name)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.tensions.methods import METHODS
@@ -18,14 +19,14 @@ DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 FIRST = DOCS / "start.md"
 """Its runs draw all their figures; elsewhere the replay stands for them, and for those of plans,
-which tests of plans look at."""
+workspaces and stability, which their own tests look at."""
 
 WHOLE = (FIRST, DOCS / "tutorial.md")
-"""Pages whose runs go on to their end; those of others begin as their page says and last two
-seconds, since each scenario runs to its end where its own room is tested."""
+"""Pages whose runs go on to their end; those of others begin as their page says, and are short:
+each scenario runs to its end where its own room is tested."""
 
-LENGTHS = {"--duration", "--compare-reactions"}
-"""Options that say how long a run lasts."""
+SHORT = {"simulate": ["--duration", "0.5"], "reactions": ["--break-time", "0.2", "--after", "0.2"]}
+"""Words that make a run short, whatever a page says before them."""
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
 
@@ -62,9 +63,15 @@ def exit_code(words):
 @with_blocks("python")
 def test_python_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names = {}
-    for code in blocks(page, "python"):
-        exec(compile(code, str(page), "exec"), names)
+    compare, names = cdpr.compare_reactions, {}
+
+    def short(*given, **more):
+        return compare(*given, **more | {"time": 0.2, "after": 0.2})
+
+    monkeypatch.setattr(cdpr, "compare_reactions", short)
+    with only():
+        for code in blocks(page, "python"):
+            exec(compile(code, str(page), "exec"), names)
 
 
 @with_blocks("sh")
@@ -76,8 +83,8 @@ def test_commands_run(page, tmp_path, monkeypatch):
             for line in code.replace("\\\n", " ").splitlines():
                 program, *words = shlex.split(line, comments=True)
                 assert program == "cdpr", line
-                if words[0] == "simulate" and page not in WHOLE and not LENGTHS.intersection(words):
-                    words += ["--duration", "2"]
+                if words[0] == "simulate" and page not in WHOLE:
+                    words += SHORT["reactions" if "--compare-reactions" in words else "simulate"]
                 assert exit_code(words) == 0, line
 
 

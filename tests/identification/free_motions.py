@@ -103,14 +103,19 @@ def log(case, seed=0, *, tension=0.0, place=0.0, angle=0.0, span=SPAN):
     """The motion with noise."""
     random = np.random.default_rng([seed, 7])
     time, poses, t = motion(case, span)
-    e = angle * random.standard_normal((len(time), 3))
+    turns = angle * random.standard_normal((len(time), 3))
+    poses = moved(poses, turns, place * random.standard_normal((len(time), 3)))
+    return time, poses, t + tension * random.standard_normal(t.shape)
+
+
+def moved(poses, e, d):
+    """Poses turned by e [rad] and moved by d [m] in W, shape (k, 3) each."""
     q, v = poses[:, :1], poses[:, 1:4]
     turned = np.hstack([
         q - 0.5 * np.sum(e * v, axis=1, keepdims=True), v + 0.5 * (q * e + np.cross(e, v)),
     ])  # fmt: skip
     turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    places = poses[:, 4:] + place * random.standard_normal((len(time), 3))
-    return time, np.hstack([turned, places]), t + tension * random.standard_normal(t.shape)
+    return np.hstack([turned, poses[:, 4:] + d])
 
 
 def believed(case, **changes):

@@ -1,6 +1,7 @@
 """Logs of motions that are known in closed form, for tests of identification."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -76,25 +77,30 @@ TRUE = believed(
 )
 
 
-def log(model=TRUE, seed=0, *, turn=1.0, move=1.0, tension=0.0, place=0.0, angle=0.0, span=SPAN):
-    """Time, pose rows and tensions of a motion, with noise."""
-    random = np.random.default_rng(seed)
+@cache
+def _exact(turn, move, span):
+    """Time, rotations, positions and tensions of a motion of the true body; nobody changes them."""
     time = np.arange(0.0, span, 1.0 / RATE)
     R, p, V, A = motion(time, turn, move)
-    wrench = inertia_regressor(R, V, A, G) @ model.inertial()
-    poses = np.array([pose_row(RigidTransform(_rotation(a), b)) for a, b in zip(R, p, strict=True)])
-    t, W = np.empty((len(time), 8)), np.empty((6, 8))
-    packed = CABLES.packed()
-    for n, row in enumerate(poses):
-        wrench_matrix_at(np.concatenate([row, np.zeros(6)]), packed, 0.0, W)
+    wrench = inertia_regressor(R, V, A, G) @ TRUE.inertial()
+    turns = [_rotation(a) for a in R]
+    t, W, packed = np.empty((len(time), 8)), np.empty((6, 8)), CABLES.packed()
+    for n, X in enumerate(map(RigidTransform, turns, p)):
+        wrench_matrix_at(np.concatenate([pose_row(X), np.zeros(6)]), packed, 0.0, W)
         t[n] = 20.0 + np.linalg.pinv(W) @ (wrench[n] - W @ np.full(8, 20.0))
+    return time, turns, p, t
+
+
+def log(seed=0, *, turn=1.0, move=1.0, tension=0.0, place=0.0, angle=0.0, span=SPAN):
+    """Time, pose rows and tensions of a motion of the true body, with noise."""
+    random, (time, turns, p, t) = np.random.default_rng(seed), _exact(turn, move, span)
     turned = angle * random.standard_normal((len(time), 3))
-    noisy = [
-        RigidTransform(rotation_from_vector(e) @ _rotation(a), b)
-        for e, a, b in zip(turned, R, p + place * random.standard_normal(p.shape), strict=True)
-    ]
-    rows = np.array([pose_row(X) for X in noisy])
-    return time, rows, t + tension * random.standard_normal(t.shape)
+    places = p + place * random.standard_normal(p.shape)
+    rows = np.array([
+        pose_row(RigidTransform(rotation_from_vector(e) @ R, b))
+        for e, R, b in zip(turned, turns, places, strict=True)
+    ])  # fmt: skip
+    return time.copy(), rows, t + tension * random.standard_normal(t.shape)
 
 
 def _rotation(R):

@@ -1,4 +1,4 @@
-"""Weights of the platform's equations, by numbers of cables, and fits that miss them."""
+"""Weights of the platform's equations, fits that miss them, and the cost of outliers."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from cdpr_drake.identification.correlated_noise import CorrelatedNoise
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
-from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
+from cdpr_drake.identification.robust_cost import HUBER, huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import (
     LEAST_POSE,
     LEAST_TENSION,
@@ -20,7 +20,9 @@ from cdpr_drake.identification.samples import (
     wrench_matrix_slopes,
 )
 from tests.identification import free_motions
-from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log
+from tests.identification.free_motions import CASES, NOISE, G, believed, body, cables, log, moved
+
+# Weights of the platform's equations, by numbers of cables, and fits that miss them.
 
 BANDWIDTH = 8.0
 SEEDS = 4
@@ -28,9 +30,12 @@ WITHIN = 0.1
 """Of chi-square per equation from 1; of four logs it scatters by 0.03."""
 
 
-def program(log_rows, case, model, unknown):
+def program(log_rows, case, model, unknown, bandwidth=BANDWIDTH):
+    """Of rows of a log, or of samples."""
     made = IdentificationProgram(model, unknown, gravity=G, size=0.3)
-    made.AddMotion(sample_motion(*log_rows, cables(case), BANDWIDTH))
+    if isinstance(log_rows, tuple):
+        log_rows = sample_motion(*log_rows, cables(case), bandwidth)
+    made.AddMotion(log_rows)
     return made
 
 
@@ -49,9 +54,8 @@ def test_errors_with_few_cables_are_as_large_as_the_covariance_says():
     """At twice the bandwidth, which leaves less of what smoothing takes than there is noise."""
     total, count, unknown = 0.0, 0, ("mass", "center_of_mass", "inertia")
     for case, seed in ((3, 0), (4, 1)):
-        samples = sample_motion(*log(case, seed, **NOISE), cables(case), 2.0 * BANDWIDTH)
-        made = IdentificationProgram(believed(case), unknown, gravity=G, size=0.3)
-        made.AddMotion(samples)
+        rows = log(case, seed, **NOISE)
+        made = program(rows, case, believed(case), unknown, 2.0 * BANDWIDTH)
         found = made.Solve()
         e = found.values - made.layout.values(body(case).vector())
         total, count = total + e @ np.linalg.solve(found.covariance, e), count + len(e)
@@ -61,27 +65,12 @@ def test_errors_with_few_cables_are_as_large_as_the_covariance_says():
     assert low < total < high
 
 
-def swaying(poses, time, size):
-    """Poses that are off by slow waves of a size [m], and of twice as much [rad]."""
-    wave = size * np.sin(np.outer(time, [0.5, 0.8, 1.1]) + np.arange(3))
-    return moved(poses, 2.0 * wave, wave[:, ::-1])
-
-
-def moved(poses, e, d):
-    """Poses turned by e [rad] and moved by d [m] in W, shape (k, 3) each."""
-    q, v = poses[:, :1], poses[:, 1:4]
-    turned = np.hstack([
-        q - 0.5 * np.sum(e * v, axis=1, keepdims=True), v + 0.5 * (q * e + np.cross(e, v)),
-    ])  # fmt: skip
-    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
-    return np.hstack([turned, poses[:, 4:] + d])
-
-
 @pytest.fixture(scope="module")
 def off():
-    """Four cables, and poses 5 mm and 0.6 deg off, 250 times as much as they jitter."""
+    """Four cables; poses 5 mm and 0.6 deg off in slow waves, 250 times as much as they jitter."""
     time, poses, tensions = log(4, **{**NOISE, "place": 2e-5, "angle": 2e-5})
-    return time, swaying(poses, time, 0.005), tensions
+    wave = 0.005 * np.sin(np.outer(time, [0.5, 0.8, 1.1]) + np.arange(3))
+    return time, moved(poses, 2.0 * wave, wave[:, ::-1]), tensions
 
 
 @pytest.mark.parametrize("unknown", [("mass",), ("mass", "center_of_mass")])
@@ -98,7 +87,7 @@ def test_poses_that_are_off_do_not_take_the_mass_away(off, unknown):
 
 
 NO_WORSE = 1.2
-"""Times the error of equal weights, or the standard error, root mean square over logs, that chance
+"""Times the error of equal weights, or the standard error, whichever is larger, that chance
 may make of weights that are as good."""
 
 LOST = 0.3
@@ -131,21 +120,16 @@ def badly_tracked(poses, time, kind, seed):
 @pytest.mark.parametrize("kind", ["slow", "quicker", "constant", "stretches"])
 @pytest.mark.parametrize(("case", "mass"), [(4, 12.992), (6, 3.0), (8, 12.992)])
 def test_weights_are_no_worse_than_equal_ones_where_poses_are_off(case, mass, kind):
-    masses, centres = [], []
-    for seed in (0, 1):
-        time, poses, tensions = log(case, seed, **{**NOISE, "place": 2e-5, "angle": 4e-5})
-        poses = badly_tracked(poses, time, kind, seed)
-        true = replace(body(case), mass=mass, inertia=body(case).inertia * mass / 13.0)
-        samples = sample_motion(time, poses, tensions * mass / 13.0, cables(case), BANDWIDTH)
-        believed = replace(true, mass=0.8 * mass)
-        made = IdentificationProgram(believed, ("mass", "center_of_mass"), gravity=G, size=0.3)
-        made.AddMotion(samples)
-        found, (m, *mc) = made.Solve(), with_equal_weights(samples, case)
-        off, center = found.values[1:4] - true.center_of_mass, np.array(mc) / m
-        masses.append([found.model.mass - mass, m - mass, found.std[0]])
-        centres.append([*map(np.linalg.norm, (off, center - true.center_of_mass, found.std[1:4]))])
-    for errors in (masses, centres):
-        weighted, equal, told = np.sqrt(np.mean(np.square(errors), axis=0))
+    time, poses, tensions = log(case, 0, **{**NOISE, "place": 2e-5, "angle": 4e-5})
+    poses = badly_tracked(poses, time, kind, 0)
+    true = replace(body(case), mass=mass, inertia=body(case).inertia * mass / 13.0)
+    samples = sample_motion(time, poses, tensions * mass / 13.0, cables(case), BANDWIDTH)
+    made = program(samples, case, replace(true, mass=0.8 * mass), ("mass", "center_of_mass"))
+    found, (m, *mc) = made.Solve(), with_equal_weights(samples, case)
+    off, center = found.values[1:4] - true.center_of_mass, np.array(mc) / m
+    masses = np.abs([found.model.mass - mass, m - mass, found.std[0]])
+    centres = [*map(np.linalg.norm, (off, center - true.center_of_mass, found.std[1:4]))]
+    for weighted, equal, told in (masses, centres):
         assert weighted < NO_WORSE * max(equal, told)
         assert weighted < LOST * equal or kind != "stretches"
 
@@ -159,12 +143,10 @@ def test_tensions_of_the_tracked_poses_tell_the_mass_that_they_were_made_with():
     fitted = np.array(
         [np.linalg.lstsq(*each, rcond=None)[0] for each in zip(samples.W, wrench, strict=True)]
     )
-    made = IdentificationProgram(
-        believed(4, center_of_mass=body(4).center_of_mass), ("mass",), gravity=G, size=0.3
-    )
-    made.AddMotion(replace(samples, tensions=fitted))
-    found = made.Solve()
-    equal = with_equal_weights(replace(samples, tensions=fitted), 4)[0]
+    samples = replace(samples, tensions=fitted)
+    model = believed(4, center_of_mass=body(4).center_of_mass)
+    found = program(samples, 4, model, ("mass",)).Solve()
+    equal = with_equal_weights(samples, 4)[0]
     assert abs(found.model.mass - 13.0) < abs(equal - 13.0) + found.std[0]
     assert found.std[0] < 0.001 * found.model.mass
     assert found.pose_error == pytest.approx(0.005, rel=0.7)
@@ -268,18 +250,6 @@ def test_sigmas_beside_the_others_see_through_common_noise():
     assert off[1] == pytest.approx(-0.5 * (1.0 - 1e-4) / small)
 
 
-def test_the_robust_cost_is_that_of_its_weights():
-    """Its slope is that of weighted squares; the limit is by the median of what is off."""
-    rest = np.array([-30.0, -3.0, 0.0, 2.0, 9.0])
-    for limit in (4.0, 8.0):
-        step = 1e-6 * np.eye(5)
-        slope = [(huber_cost(rest + d, limit) - huber_cost(rest - d, limit)) / 2e-6 for d in step]
-        np.testing.assert_allclose(slope, 2.0 * huber_weights(rest, limit) * rest, atol=1e-5)
-    assert huber_limit(rest) == pytest.approx(4.0 * 1.4826 * 3.0)
-    assert huber_limit(0.1 * rest) == 4.0
-    assert huber_limit(np.zeros(0)) == 4.0
-
-
 def test_a_prior_that_contradicts_the_log_is_said():
     made = program(log(8, **NOISE), 8, believed(8, mass=10.0), ("mass", "center_of_mass"))
     agreed = made.Solve()
@@ -289,3 +259,39 @@ def test_a_prior_that_contradicts_the_log_is_said():
     sigmas = (found.model.mass - 10.0) / 0.01
     assert any(f"up to {sigmas:.3g} of their" in words for words in found.remarks)
     assert (found.last_step > 0.1) == any("still moved" in words for words in found.remarks)
+
+
+# The cost of residuals that may be outliers: squares, then linear, and weights that lead down.
+
+STEP = 1e-6
+DIFFERENCE = 1e-8
+"""Of a central difference of a cost of up to 100 by a step of 1e-6."""
+
+
+def test_the_cost_is_square_up_to_the_limit_and_linear_beyond():
+    np.testing.assert_allclose(huber_cost(np.array([-3.0, 2.0]), 4.0), 13.0)
+    at = [huber_cost(np.array([x]), 4.0) for x in (4.0, 5.0, -6.0, 104.0)]
+    np.testing.assert_allclose(at, [16.0, 24.0, 32.0, 816.0])
+
+
+@pytest.mark.parametrize("x", [-20.0, -4.5, -3.9, 0.5, 3.9, 4.1, 12.0])
+def test_weights_are_those_of_its_slope(x):
+    """The cost's derivative is that of weighted squares, 2 w x."""
+    ahead, behind = (huber_cost(np.array([x + s]), 4.0) for s in (STEP, -STEP))
+    slope = (ahead - behind) / (2.0 * STEP)
+    assert 2.0 * huber_weights(np.array([x]), 4.0)[0] * x == pytest.approx(slope, rel=DIFFERENCE)
+
+
+def test_what_fits_exactly_counts_in_full():
+    np.testing.assert_array_equal(huber_weights(np.array([0.0, -4.0]), 4.0), [1.0, 1.0])
+
+
+def test_the_limit_is_four_of_the_spread_that_is_there():
+    residuals = np.random.default_rng(2).normal(size=100_000)
+    for spread in (2.0, 5.0):
+        wild = np.append(spread * residuals, np.full(1000, 1e6))  # a hundredth is off
+        assert huber_limit(wild) == pytest.approx(HUBER * spread, rel=0.03)
+    rest = np.array([-30.0, -3.0, 0.0, 2.0, 9.0])
+    assert huber_limit(rest) == pytest.approx(4.0 * 1.4826 * 3.0)  # by the median of what is off
+    # Sigmas that were given too large, or nothing to judge them by, make none smaller.
+    assert huber_limit(0.1 * residuals) == HUBER == huber_limit(np.zeros(0)) == 4.0

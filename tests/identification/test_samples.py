@@ -103,15 +103,17 @@ def test_outliers_of_poses_and_tensions_are_counted():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda X, t: (X[:, :6], t), r"poses: found shape \(500, 6\); accepted: \(500, 7\)"),
-        (lambda X, t: (X[1:], t), r"poses: found shape \(499, 7\)"),
-        (lambda X, t: (X, t[:, 1:]), r"tensions: found shape \(500, 7\); accepted: \(500, 8\)"),
+        (lambda t, X, f: (t, X[:, :6], f), r"poses: found shape \(500, 6\); accepted: \(500, 7\)"),
+        (lambda t, X, f: (t, X[1:], f), r"poses: found shape \(499, 7\)"),
+        (lambda t, X, f: (t, X, f[:, 1:]), r"tensions: found shape \(500, 7\); .*: \(500, 8\)"),
+        (lambda t, X, f: (t[:10], X[:10], f[:10]), "found 10 rows"),
+        (lambda t, X, f: (t, X, np.full_like(f, np.nan)), "signal without a row"),
+        (lambda t, X, f: (np.where(t > 1.0, t + 2.0, t), X, f), "no rows from"),
     ],
 )
-def test_shapes_are_checked(change, words):
-    time, poses, tensions = log(span=2.0)
+def test_bad_logs_are_refused(change, words):
     with pytest.raises(IdentificationError, match=words):
-        sample_motion(time, *change(poses, tensions), CABLES, BANDWIDTH)
+        sample_motion(*change(*log(span=2.0)), CABLES, BANDWIDTH)
 
 
 def test_a_pose_that_no_cable_can_have_is_named_by_its_time():
@@ -142,13 +144,17 @@ def test_quaternions_that_jump_to_the_other_side_are_the_same_motion(exact):
     np.testing.assert_array_equal(_one_side(right), right)
 
 
+def late_by(rows, span=6.0, **how):
+    """Samples of a log whose poses are late, which stand still at its ends, and `pose_shift`."""
+    time, poses, tensions = log(span=span, **how, **NOISE)
+    n = np.clip(np.arange(len(time)) - rows, 0, len(time) - 1)
+    return pose_shift(sample_motion(time, poses[n], tensions, CABLES, BANDWIDTH), CABLES, G)
+
+
 @pytest.mark.parametrize("late", [30, -20])
 def test_poses_that_are_late_are_told_by_how_much(late):
-    """By rows of 4 ms, at the ends of which the first or last pose stands still."""
-    time, poses, tensions = log(span=6.0, **NOISE)
-    n = np.clip(np.arange(len(time)) - late, 0, len(time) - 1)
-    of = sample_motion(time, poses[n], tensions, CABLES, BANDWIDTH)
-    shift, better = pose_shift(of, CABLES, G)
+    """By rows of 4 ms."""
+    shift, better = late_by(late)
     assert shift == pytest.approx(0.004 * late, abs=2e-3)
     assert better > 3.0
 
@@ -161,27 +167,16 @@ def test_poses_that_are_in_time_are_said_to_be(noisy):
 
 def test_shifts_are_looked_for_up_to_half_a_second():
     """0.45 s of a log of six, and no further; a log of a second has too few samples."""
-    time, poses, tensions = log(span=6.0, **NOISE)
-    n = np.clip(np.arange(len(time)) - 112, 0, len(time) - 1)
-    of = sample_motion(time, poses[n], tensions, CABLES, BANDWIDTH)
-    assert pose_shift(of, CABLES, G)[0] == pytest.approx(0.448, abs=5e-3)
-    n = np.clip(np.arange(len(time)) - 200, 0, len(time) - 1)
-    of = sample_motion(time, poses[n], tensions, CABLES, BANDWIDTH)
-    assert abs(pose_shift(of, CABLES, G)[0]) <= 0.5 + 0.03
-    short = sample_motion(*log(span=1.0, **NOISE), CABLES, BANDWIDTH)
-    assert pose_shift(short, CABLES, G) == (0.0, 1.0)
+    assert late_by(112)[0] == pytest.approx(0.448, abs=5e-3)
+    assert abs(late_by(200)[0]) <= 0.5 + 0.03
+    assert late_by(0, 1.0) == (0.0, 1.0)
     # 0.15 of a log of two seconds: 0.3 s, which leaves 22 samples.
-    n = np.clip(np.arange(500) - 60, 0, 499)
-    brief = sample_motion(time[:500], poses[n], tensions[:500], CABLES, BANDWIDTH)
-    assert pose_shift(brief, CABLES, G)[0] == pytest.approx(0.24, abs=5e-3)
+    assert late_by(60, 2.0)[0] == pytest.approx(0.24, abs=5e-3)
 
 
 def test_moments_and_forces_both_count_for_a_shift():
     """A platform that turns on the spot: all but the weight are moments."""
-    time, poses, tensions = log(span=6.0, move=0.0, **NOISE)
-    n = np.clip(np.arange(len(time)) - 25, 0, len(time) - 1)
-    of = sample_motion(time, poses[n], tensions, CABLES, BANDWIDTH)
-    assert pose_shift(of, CABLES, G)[0] == pytest.approx(0.1, abs=4e-3)
+    assert late_by(25, move=0.0)[0] == pytest.approx(0.1, abs=4e-3)
 
 
 RATIO, INERTIA, BAND, LEAST, FADES = np.array([0.02, 0.05]), 3e-4, 6.0, 0.805, 2.0

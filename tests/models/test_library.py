@@ -42,8 +42,6 @@ PRINTED_DIGITS = 0.005
 """Half of the last digit of the tensions in servoing thesis, section 1.3.4 [N]."""
 
 ROBOTS = files("cdpr_drake.models").joinpath("robots")
-ACROBOTS = ("acrobot_small", "acrobot_large", "acrobot_fully_constrained")
-
 UPPER_EXITS = [
     (-0.47, -0.525, 1.165), (-0.52, -0.465, 1.165), (-0.52, 0.475, 1.165), (-0.47, 0.53, 1.165),
     (0.47, 0.53, 1.165), (0.52, 0.475, 1.165), (0.525, -0.47, 1.165), (0.47, -0.52, 1.165),

@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
-from pydrake.systems.primitives import Linearize
 
 from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.cables.models import cable_state
@@ -26,17 +24,10 @@ from cdpr_drake.statics.forward_kinematics import ForwardKinematics
 from cdpr_drake.statics.inextensible_equilibrium import tension_stiffness
 from cdpr_drake.statics.sensitivity import pose_sensitivity
 from cdpr_drake.statics.stiffness import platform_stiffness
-from cdpr_drake.systems.robots.cable_robot import CableRobot
-from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.robots import content_of, robot_of
-from tests.systems.robots.engines import made
 
 POSE = RigidTransform(rotation_from_vector(np.array([0.1, -0.05, 0.15])), [0.05, -0.06, 0.3])
-HOW = CableRobotSettings(cables=CableSettings(pulleys=True))
-
 STIFF = 1e-6
 """Of central differences of forces, relative to the largest stiffness."""
 
@@ -138,65 +129,6 @@ def test_winches_know_how_fast():
     R, p = np.ascontiguousarray(POSE.rotation().matrix()), np.array(POSE.translation())
     rates = cable_rates_from_base_twist(R, p, CABLES.packed(), V)
     np.testing.assert_allclose(rates, cable_paths(POSE, CABLES).J @ V, atol=1e-14)
-
-
-def test_both_engines_move_it_alike():
-    ends = []
-    command = 0.02 * np.cos(np.arange(8.0))
-    for kind in (CableRobot, CompiledCableRobot):
-        block = made(kind, ROBOT, HOW)
-        simulator = Simulator(block)
-        context = simulator.get_mutable_context()
-        block.set_at_equilibrium(context, POSE)
-        block.GetInputPort("cable_velocities").FixValue(context, command)
-        if kind is CableRobot:
-            ResetIntegratorFromFlags(simulator, "runge_kutta3", 1e-4).set_fixed_step_mode(True)
-        else:
-            block.integrate_by(StepRule(max_step=1e-4))
-        simulator.AdvanceTo(0.02)
-        names = ("platform_state", "tensions", "lengths")
-        ends.append(np.concatenate([block.GetOutputPort(name).Eval(context) for name in names]))
-    np.testing.assert_allclose(*ends, rtol=1e-8, atol=SAME_STEPS)
-
-
-def test_energy_stays_without_damping():
-    free = CableRobotSettings(cables=CableSettings(model="elastic", pulleys=True))
-    block = CompiledCableRobot(ROBOT, free)
-    simulator = Simulator(block)
-    context = simulator.get_mutable_context()
-    block.set_at_equilibrium(context, POSE)
-    block.GetInputPort("cable_velocities").FixValue(context, np.zeros(8))
-    own = block.GetMutableSubsystemContext(block.motion, context)
-    state = block.motion.state(own).copy()
-    state[7:13] = [0.05, -0.04, 0.06, 0.004, 0.003, -0.005]
-    block.motion.set_state(own, state)
-    block.integrate_by(StepRule(max_step=2e-5))
-    before = block.motion.energy(own)
-    kinetic = before - block.motion.energy_of(np.r_[state[:7], np.zeros(6), state[13:]])
-    simulator.AdvanceTo(0.05)
-    assert np.max(np.abs(block.motion.state(own)[:7] - state[:7])) > 1e-6
-    assert block.motion.energy(own) == pytest.approx(before, abs=1e-4 * kinetic)
-
-
-def test_the_plant_is_differentiable():
-    block = CableRobot(ROBOT, HOW)
-    context = block.CreateDefaultContext()
-    block.set_at_equilibrium(context, POSE)
-    port = block.GetInputPort("cable_velocities")
-    port.FixValue(context, np.zeros(8))
-    linear = Linearize(
-        block, context, port.get_index(), block.GetOutputPort("tensions").get_index()
-    )
-    x, h = context.get_continuous_state_vector().CopyToVector(), 1e-8
-
-    def rates(x):
-        context.SetContinuousState(x)
-        return block.EvalTimeDerivatives(context).CopyToVector()
-
-    A = linear.A()
-    for k, e in enumerate(np.eye(len(x))):
-        slope = (rates(x + h * e) - rates(x - h * e)) / (2.0 * h)
-        np.testing.assert_allclose(A[:, k], slope, atol=1e-6 * np.max(np.abs(A)))
 
 
 def test_curves_end_at_the_anchor_points():

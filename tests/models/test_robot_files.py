@@ -87,23 +87,13 @@ RAIL = {"axis": [0.0, 0.0, 2.0], "lower": -0.2, "upper": 0.1}
 
 # (changes, the key that is named with what was found there, what is accepted)
 REFUSALS = [
-    ({MASS: "nan"}, "platform.mass: found ", f"{OVER_0} [kg]"),
-    ({MASS: math.nan}, "platform.mass: found ", f"{OVER_0} [kg]"),
-    ({MASS: -1.0}, "platform.mass: found ", f"{OVER_0} [kg]"),
     ({MASS: 0.0}, "platform.mass: found ", f"{OVER_0} [kg]"),
-    ({MASS: math.inf}, "platform.mass: found ", f"{OVER_0} [kg]"),
-    ({MASS: "heavy"}, "platform.mass: found ", f"{OVER_0} [kg]"),
-    ({MASS: None}, "platform.mass: found ", f"{OVER_0} [kg]"),
     ({"platform__size": [0.1, 0.2]}, "platform.size: found ", "3 numbers > 0 [m]"),
-    ({"platform__size": 0.1}, "platform.size: found ", "3 numbers > 0 [m]"),
-    ({"platform__size__1": math.nan}, "platform.size[1]: found .nan", "3 numbers > 0 [m]"),
     ({"platform__inertia": [1.0, 1, 1]}, "platform.inertia: found ", "6 numbers [kg m^2] or null"),
     ({"platform__inertia": [0.01, 0.01, 0.03, 0, 0, 0]}, "platform.inertia: found ", MOMENTS),
     ({"platform__inertia": [0.01, 0.01, 0.01, 0.02, 0, 0]}, "platform.inertia: found ", MOMENTS),
     ({"platform__inertia__0": 1000001.0}, "platform.inertia: found ", MOMENTS),
-    ({"cable__diameter": math.nan}, "cable.diameter: found ", f"{OVER_0} [m]"),
     ({"cable__diameter": -0.002}, "cable.diameter: found ", f"{OVER_0} [m]"),
-    ({"cable__youngs_modulus": math.nan}, "cable.youngs_modulus: found ", f"{OVER_0} [Pa]"),
     ({"cable__youngs_modulus": 0.0}, "cable.youngs_modulus: found ", f"{OVER_0} [Pa]"),
     ({"cable__retardation_time": -1e-4}, "cable.retardation_time: found ",
      "a number >= 0 and <= 1 [s]"),
@@ -111,8 +101,6 @@ REFUSALS = [
      "a number >= 0 and <= 1 [s]"),
     ({"winch__gear_ratio": 0.0}, "winch.gear_ratio: found ", f"{OVER_0} [-]"),
     ({"tension_bounds__lower": -1.0}, "tension_bounds.lower: found ", "a number >= 0 [N]"),
-    ({"tension_bounds__lower": 200.0}, "tension_bounds: found lower 200, upper 100",
-     "lower < upper"),
     ({"tension_bounds__lower": 100.0}, "tension_bounds: found lower 100, upper 100",
      "lower < upper"),
     ({"gravity": -9.81}, "gravity: found ", "a number >= 0 [m/s^2]"),
@@ -315,7 +303,7 @@ def numbers(value):
     return [] if value is None or isinstance(value, str) else np.ravel(value).tolist()
 
 
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(
     st.sampled_from(number_keys(yaml.safe_load(ROBOT))),
     st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0]) | st.floats(-1e3, 1e3),

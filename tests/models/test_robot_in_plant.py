@@ -12,7 +12,6 @@ from cdpr_drake.models.robot_in_plant import (
     add_robot,
     platform_box,
     platform_inertia,
-    pose_from_state,
 )
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_forces import CableForces
@@ -99,37 +98,6 @@ def test_poses_of_two_robots_of_one_kind_come_back_at_rest(name, X_WP):
     np.testing.assert_array_equal(plant.GetVelocities(context), 0.0)
 
 
-@pytest.mark.parametrize("name", ["acrobot_small", "planar"])
-def test_pose_from_state_is_the_plant_s_pose(name):
-    """Also where an integrator has let the quaternion's norm drift."""
-    robot = load_robot(name)
-    plant, (handle,) = plant_with(robot)
-    context = plant.CreateDefaultContext()
-    random = np.random.default_rng(7)
-    for _ in range(20):
-        q = random.standard_normal(plant.num_positions())
-        if not robot.is_planar():
-            q[:4] /= np.linalg.norm(q[:4])
-        plant.SetPositions(context, q)
-        state = plant.get_state_output_port(handle.model_instance).Eval(context).copy()
-        assert max(pose_error(handle.pose(context), pose_from_state(robot, state))) < ROUND_OFF
-        if not robot.is_planar():
-            state[:4] *= 1.001
-            assert max(pose_error(handle.pose(context), pose_from_state(robot, state))) < ROUND_OFF
-
-
-def test_planar_platform_moves_in_its_plane_about_its_normal():
-    robot = load_robot("planar")
-    plant, (handle,) = plant_with(robot)
-    context = plant.CreateDefaultContext()
-    assert plant.num_velocities() == 3
-    plant.SetVelocities(context, np.array([0.1, 0.2, 0.3]))
-    velocity = handle.body.EvalSpatialVelocityInWorld(context)
-    np.testing.assert_allclose(velocity.translational(), [0.1, 0.2, 0.0], atol=ROUND_OFF)
-    np.testing.assert_allclose(velocity.rotational(), [0.0, 0.0, 0.3], atol=ROUND_OFF)
-    assert handle.pose(context).translation()[2] == robot.plane_height
-
-
 def test_the_same_name_twice_is_refused():
     plant = MultibodyPlant(0.0)
     robot = load_robot("acrobot_small")
@@ -141,43 +109,33 @@ def test_the_same_name_twice_is_refused():
 @pytest.mark.parametrize(("name", "size"), [("acrobot_small", 6), ("planar", 3)])
 def test_forces_reach_only_the_platform_among_other_bodies(name, size):
     """A robot between two loose bodies: offsets, and the same force as in a plant of its own."""
-    robot = load_robot(name)
-    plant = MultibodyPlant(0.0)
-    ball = SpatialInertia.SolidSphereWithMass(1.0, 0.1)
-    plant.AddRigidBody("before", default_model_instance(), ball)
-    handle = add_robot(plant, robot)
-    plant.AddRigidBody("after", default_model_instance(), ball)
-    plant.Finalize()
-    alone, (handle_alone,) = plant_with(robot)
-
-    start = handle.first_velocity()
-    context = plant.CreateDefaultContext()
-    plant.SetVelocities(context, handle.model_instance, np.arange(1.0, size + 1.0))
-    expected = np.zeros(12 + size)
-    expected[start : start + size] = np.arange(1.0, size + 1.0)
-    np.testing.assert_array_equal(plant.GetVelocities(context), expected)
-
-    forces = []
-    for in_plant in (handle, handle_alone):
-        own = in_plant.plant.CreateDefaultContext()
-        X_WP = robot.home.transform() @ RigidTransform(
-            rotation_from_angles([0.0, 0.0, 0.1]), [0.02, -0.01, 0.0]
-        )
-        in_plant.set_pose(own, X_WP)
-        cables = CableForces(in_plant)
+    robot, ball, forces = load_robot(name), SpatialInertia.SolidSphereWithMass(1.0, 0.1), []
+    turn = RigidTransform(rotation_from_angles([0.0, 0.0, 0.1]), [0.02, -0.01, 0.0])
+    m, ones = len(robot.cables), np.arange(1.0, size + 1.0)
+    for before, after in ((), ()), (("before",), ("after",)):
+        plant = MultibodyPlant(0.0)
+        for body in before:
+            plant.AddRigidBody(body, default_model_instance(), ball)
+        handle = add_robot(plant, robot)
+        for body in after:
+            plant.AddRigidBody(body, default_model_instance(), ball)
+        plant.Finalize()
+        context = plant.CreateDefaultContext()
+        handle.set_pose(context, robot.home.transform() @ turn)
+        cables = CableForces(handle)
         inputs = cables.CreateDefaultContext()
-        state = in_plant.plant.get_state_output_port(in_plant.model_instance).Eval(own)
-        m = len(robot.cables)
+        state = plant.get_state_output_port(handle.model_instance).Eval(context)
         cables.GetInputPort("platform_state").FixValue(inputs, state)
         cables.GetInputPort("unstrained_lengths").FixValue(inputs, np.full(m, 0.5))
         cables.GetInputPort("unstrained_length_rates").FixValue(inputs, np.zeros(m))
         forces.append(cables.GetOutputPort("generalized_force").Eval(inputs))
-    among_others, of_itself = forces
-    assert among_others.shape == (12 + size,)
+    of_itself, among_others = forces
     assert np.count_nonzero(of_itself) == size
-    np.testing.assert_array_equal(among_others[start : start + size], of_itself)
-    assert np.count_nonzero(among_others) == size
-    assert alone.num_velocities() == size
+    start, expected, velocities = handle.first_velocity(), np.zeros(12 + size), np.zeros(12 + size)
+    expected[start : start + size], velocities[start : start + size] = of_itself, ones
+    np.testing.assert_array_equal(among_others, expected)
+    plant.SetVelocities(context, handle.model_instance, ones)
+    np.testing.assert_array_equal(plant.GetVelocities(context), velocities)
 
 
 @pytest.mark.parametrize(

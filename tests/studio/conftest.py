@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import inspect
 import os
 import sys
 from contextlib import redirect_stdout
@@ -12,6 +13,7 @@ import pytest
 
 from cdpr_drake.analyses.front.logs import replay_log
 from cdpr_drake.cli.app import main
+from tests.studio.pages import held_page
 from tests.studio.served import served
 
 ROOT = Path(__file__).parents[2]
@@ -56,6 +58,45 @@ def beside(alone, tmp_path_factory):
     folder = tmp_path_factory.mktemp("work") / "logs" / "small"
     replay_log(alone / "log.csv", "acrobot_small", folder=folder)
     return folder
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
+    """Working folder of the page that a module's tests share."""
+    return tmp_path_factory.mktemp("work")
+
+
+@pytest.fixture(scope="module")
+def held(request, work):
+    """That page, of the module's `ROBOT`."""
+    with held_page(work, request.module.ROBOT) as page:
+        yield page
+
+
+@pytest.fixture
+def user(held):
+    """Who has opened it, and is told nothing yet."""
+    held.run(held.begin())
+    return held.user
+
+
+@pytest.fixture
+def bench(held, user):
+    """Its workbench, with the robot as it was in the beginning."""
+    return held.bench
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem):
+    """A test that is a coroutine runs in the page that is held, or in a loop of its own."""
+    if not inspect.iscoroutinefunction(pyfuncitem.obj):
+        return None
+    given = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
+    run = asyncio.run
+    if "held" in pyfuncitem.fixturenames:
+        run = pyfuncitem._request.getfixturevalue("held").run
+    run(pyfuncitem.obj(**given))
+    return True
 
 
 @pytest.fixture(scope="package")

@@ -52,26 +52,24 @@ def wrong_file(chance: random.Random, text: str) -> dict[str, bytes]:
     return files
 
 
-async def fuzz(count: int, seed: int, folder: Path) -> dict[str, int]:
+async def fuzz(count: int, seed: int, user, bench) -> dict[str, int]:
     """Tries wrong values and files; how many were refused in words, accepted, or changed nothing.
 
     Raises:
         AssertionError: Something was refused without a word, or the page does not answer any more.
     """
     chance, found = random.Random(seed), {"refused": 0, "accepted": 0, "unchanged": 0}
-    async with opened_page(folder) as (user, bench, _):
-        await until(lambda: bench.answer is not None)
-        start = bench.robot.text
-        marks = _fields(user)
-        for _ in range(count):
-            if chance.random() < 0.3:
-                found[_upload(bench, wrong_file(chance, start))] += 1
-            else:
-                found[await _type(user, bench, chance, marks)] += 1
-            if bench.robot.text != start:
-                bench.robot.change(start, bench.robot.path)
-                marks = _fields(user)
-        await _answers(bench)
+    start = bench.robot.text
+    marks = _fields(user)
+    for _ in range(count):
+        if chance.random() < 0.3:
+            found[_upload(bench, wrong_file(chance, start))] += 1
+        else:
+            found[await _type(user, bench, chance, marks)] += 1
+        if bench.robot.text != start:
+            bench.robot.change(start, bench.robot.path)
+            marks = _fields(user)
+    await _answers(bench)
     return found
 
 
@@ -129,7 +127,13 @@ def main() -> None:
     asked = options.parse_args()
     os.environ["PYTEST_CURRENT_TEST"] = "fuzz"  # by which NiceGUI knows that nothing is served
     with tempfile.TemporaryDirectory() as folder:
-        print(asyncio.run(fuzz(asked.count, asked.seed, Path(folder))))
+        print(asyncio.run(_opened_and_tried(asked.count, asked.seed, Path(folder))))
+
+
+async def _opened_and_tried(count: int, seed: int, folder: Path) -> dict[str, int]:
+    async with opened_page(folder) as (user, bench, _):
+        await until(lambda: bench.answer is not None)
+        return await fuzz(count, seed, user, bench)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """The studio's page without a browser: NiceGUI's simulated user, and no plugin of pytest."""
 
 import asyncio
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, contextmanager
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
@@ -15,23 +15,77 @@ from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 
 @asynccontextmanager
-async def opened_page(folder, robot="acrobot_large"):
-    """A user who has opened the page, and their workbench."""
-    calculator = Calculator()
-    sessions = Sessions(lambda: _bench(folder, robot, calculator))
+async def simulated(root):
+    """A user who has opened what a function makes."""
     failed = None  # NiceGUI's timers go on forever where an exception passes through it
-    try:
-        async with user_simulation(make_page(sessions, lambda _: "one")) as user:
-            client = await user.open("/")
-            await until(lambda: not _loading(user))
-            try:
-                yield user, next(iter(sessions.benches())), client
-            except BaseException as problem:
-                failed = problem
-    finally:
-        calculator.close()
+    async with user_simulation(root) as user:
+        await user.open("/")
+        try:
+            yield user
+        except BaseException as problem:
+            failed = problem
     if failed is not None:
         raise failed
+
+
+@asynccontextmanager
+async def opened_page(folder, robot="acrobot_large"):
+    """A user who has opened the page, their workbench and client."""
+    calculator = Calculator()
+    sessions = Sessions(lambda: _bench(folder, robot, calculator))
+    try:
+        async with simulated(make_page(sessions, lambda _: "one")) as user:
+            await until(lambda: not _loading(user))
+            yield user, next(iter(sessions.benches())), user.client
+    finally:
+        calculator.close()
+
+
+class HeldPage:
+    """A page that stays open for several tests; what they do is done in the task that opened it."""
+
+    def __init__(self, folder, robot):
+        self._robot, self._loop, self._asked = robot, asyncio.new_event_loop(), asyncio.Queue()
+        self._task = self._loop.create_task(self._hold(folder))
+        self.user = self.bench = None
+
+    def run(self, steps):
+        """Waits for what a coroutine does in the page."""
+        done = self._loop.create_future()
+        self._asked.put_nowait((steps, done))
+        first = asyncio.wait([done, self._task], return_when=asyncio.FIRST_COMPLETED)
+        self._loop.run_until_complete(first)
+        return done.result() if done.done() else self._task.result()  # why it does not open
+
+    def close(self):
+        """Ends it."""
+        self._asked.put_nowait(None)
+        self._loop.run_until_complete(self._task)
+        self._loop.close()
+
+    async def begin(self):
+        """The robot as it was in the beginning, and nothing that was said."""
+        self.user.notify.messages.clear()
+        self.bench.open(self._robot)
+        await until(lambda: self.bench.answer is not None and not self.bench._busy)
+
+    async def _hold(self, folder):
+        async with opened_page(folder, self._robot) as (self.user, self.bench, _):
+            while (asked := await self._asked.get()) is not None:
+                try:
+                    asked[1].set_result(await asked[0])
+                except BaseException as problem:
+                    asked[1].set_exception(problem)
+
+
+@contextmanager
+def held_page(folder, robot):
+    """A page for several tests, see `HeldPage`."""
+    held = HeldPage(folder, robot)
+    try:
+        yield held
+    finally:
+        held.close()
 
 
 def _loading(user):
@@ -65,6 +119,12 @@ def shown(user, name):
         return bool(user.find(marker=name).elements)
     except AssertionError:
         return False
+
+
+def open_panel(user, name):
+    """Shows another panel."""
+    (tabs,) = {element.parent_slot.parent for element in user.find(marker=f"tab-{name}").elements}
+    tabs.value = name
 
 
 def type_into(user, name, words):

@@ -5,8 +5,12 @@ import json
 import pytest
 
 from cdpr_drake.cli.app import main
+from cdpr_drake.studio.workbench.session import USUAL_ROBOT
 from tests.chromium import LONGEST_WAIT, cleared, complaints, wait_for
 from tests.models.formats.foreign_files import caspr
+from tests.studio.run_page import press
+
+GRID = "5,5,5"
 
 DRAG = """
     const canvas = viewer.renderer.domElement;
@@ -48,19 +52,6 @@ def page(started_browser, studio):
         yield browser
 
 
-def press(page, words):
-    """Clicks what has these words: a tab, a button."""
-    wait_for(page, f"[...document.querySelectorAll('button, .q-tab')].some(e => {says(words)})")
-    page.execute_script(
-        f"[...document.querySelectorAll('button, .q-tab')].find(e => {says(words)}).click()"
-    )
-
-
-def says(words):
-    inner = "(e.querySelector('.q-tab__label, .block') || e).textContent.trim()"
-    return f"({inner} === '{words}' || e.ariaLabel === '{words}')"
-
-
 def type_into(page, label, words):
     """Types words into the field of a label, and presses Enter, with real keys."""
     from selenium.webdriver.common.keys import Keys
@@ -90,11 +81,28 @@ def printed(capsys, *arguments):
     return json.loads(capsys.readouterr().out)
 
 
+def test_a_static_workspace_has_the_volume_of_the_command(page, tmp_path, capsys):
+    words = ["workspace", USUAL_ROBOT, "--grid", GRID, "--out", str(tmp_path / "own")]
+    told = printed(capsys, *words)["workspaces"]["static"]
+    press(page, "Workspace")
+    type_into(page, "grid", GRID)
+    press(page, "Start")
+    rows = "[...document.querySelectorAll('table[aria-label=Workspaces] tbody tr')]"
+    wait_for(page, f"{rows}.length === 1")
+    shown = page.execute_script(f"return {rows}[0].innerText.split(/\\s*[\\t\\n]\\s*/)")
+    assert f"{told['corners_m3']:.4g} m^3" in shown
+    assert f"{100.0 * told['corners_share']:.2f} %" in shown
+    page.switch_to.frame("scene")
+    solid = "viewer.scene_tree.find(['drake', 'workspaces', 'static', '<object>']).object"
+    wait_for(page, f"{solid}.isMesh && {solid}.material.depthWrite === false")
+    page.switch_to.default_content()
+
+
 def test_an_exit_point_moves_is_saved_and_tensions_are_those_of_the_command(page, folder, capsys):
     press(page, "Pose")
     wait_for(page, "document.querySelectorAll('.studio-cables tbody tr').length === 8")
     pose = "--pose=0,0,0.15"
-    before = printed(capsys, "tension", "acrobot_large", pose)["tensions_n"]
+    before = printed(capsys, "tension", USUAL_ROBOT, pose)["tensions_n"]
     assert shown_tensions(page) == [f"{tension:.2f}" for tension in before]
     press(page, "Robot")
     type_into(page, "cables 0 exit point x", "-0.37")

@@ -1,6 +1,5 @@
 """The static workspace that follows a robot while it is changed."""
 
-import asyncio
 import json
 import threading
 
@@ -16,7 +15,9 @@ from cdpr_drake.studio.workbench.scene import SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
-from tests.studio.pages import field, opened_page, type_into, until
+from tests.studio.pages import field, type_into, until
+
+ROBOT = "acrobot_large"
 
 THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])
 """Places for the first exit point of acrobot_large [m]."""
@@ -126,8 +127,8 @@ def test_a_robot_without_a_static_workspace_says_why(tmp_path):
         made.calculator.close()
 
 
-def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, monkeypatch):
-    computed = []
+async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, user, monkeypatch):
+    computed, bench = [], held.bench
 
     class Counted(SketchWork):
         def __init__(self, robot, poses):
@@ -136,28 +137,21 @@ def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(tmp_path, mo
 
     monkeypatch.setattr(workspace_sketch, "SketchWork", Counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
-
-    async def act():
-        async with opened_page(tmp_path) as (user, bench, _):
-            await until(lambda: bench.answer is not None)
-            computed.clear()
-            places = np.linspace(-0.45, -0.3, 31)
-            for x in places:
-                bench.drag_point("exit", 0, np.array([x, -0.5, 1.1]), done=False)
-            await until(lambda: bench.live.is_fine)
-            coarse = [x for poses, x in computed if poses == COARSE]
-            assert len(coarse) < 4
-            assert coarse[-1] == pytest.approx(places[-1])
-            assert computed[-1] == (FINE, coarse[-1])
-            words = field(user, "live-size").text
-            assert "refined" in words
-            assert "% of the grid's box" in words
-            assert "limits 0 to 60 N" in field(user, "live-tensions").text
-            type_into(user, "cell-cables-0-exit_point-0", "-0.35")
-            await until(lambda: computed[-1][1] == pytest.approx(-0.35))
-            await until(lambda: "refined" in field(user, "live-size").text)
-
-    asyncio.run(act())
+    places = np.linspace(-0.45, -0.3, 31)
+    for x in places:
+        bench.drag_point("exit", 0, np.array([x, -0.5, 1.1]), done=False)
+    await until(lambda: bench.live.is_fine)
+    coarse = [x for poses, x in computed if poses == COARSE]
+    assert len(coarse) < 4
+    assert coarse[-1] == pytest.approx(places[-1])
+    assert computed[-1] == (FINE, coarse[-1])
+    words = field(user, "live-size").text
+    assert "refined" in words
+    assert "% of the grid's box" in words
+    assert "limits 0 to 60 N" in field(user, "live-tensions").text
+    type_into(user, "cell-cables-0-exit_point-0", "-0.35")
+    await until(lambda: computed[-1][1] == pytest.approx(-0.35))
+    await until(lambda: "refined" in field(user, "live-size").text)
 
 
 def test_while_a_point_is_dragged_the_scene_comes_before_the_page(bench, monkeypatch):
@@ -177,26 +171,22 @@ def test_while_a_point_is_dragged_the_scene_comes_before_the_page(bench, monkeyp
     assert order[0] == "numbers"
 
 
-def test_numbers_are_called_old_only_when_the_new_ones_are_late(tmp_path, monkeypatch):
-    async def look(late):
-        monkeypatch.setattr(sessions, "LATE", late)
-        async with opened_page(tmp_path) as (_, bench, _):
-            await until(lambda: bench.answer is not None)
-            said = []
-            bench.results.changed.connect(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
-            held = threading.Event()
-            bench.calculator.submit(held.wait)  # as while a kernel is compiled
-            before = bench.answer
-            bench.drag_point("exit", 0, THERE, done=False)
-            if late < 1.0:
-                await until(lambda: any("before" in words for words in said))
-            held.set()
-            await until(lambda: bench.answer is not before)
-            await until(lambda: not bench.results.differs(POSE_NUMBERS))
-            assert any(said) == (late < 1.0)
-
-    asyncio.run(look(0.01))
-    asyncio.run(look(1e3))
+@pytest.mark.parametrize("late", [0.01, 1e3])
+async def test_numbers_are_called_old_only_when_the_new_ones_are_late(
+    held, user, monkeypatch, late
+):
+    monkeypatch.setattr(sessions, "LATE", late)
+    bench, said, held_up = held.bench, [], threading.Event()
+    bench.results.changed.connect(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
+    bench.calculator.submit(held_up.wait)  # as while a kernel is compiled
+    before = bench.answer
+    bench.drag_point("exit", 0, THERE, done=False)
+    if late < 1.0:
+        await until(lambda: any("before" in words for words in said))
+    held_up.set()
+    await until(lambda: bench.answer is not before)
+    await until(lambda: not bench.results.differs(POSE_NUMBERS))
+    assert any(said) == (late < 1.0)
 
 
 def test_who_moves_a_point_seldom_is_not_resting(bench, monkeypatch):

@@ -1,6 +1,5 @@
 """The logs panel: what is in a log, and a log beside the model of the robot that is open."""
 
-import asyncio
 import json
 import shutil
 
@@ -15,16 +14,19 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.panels.logs import _views
 from cdpr_drake.studio.workbench.recorded_logs import log_contents, log_files, read_comparison
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from tests.studio.pages import field, opened_page, problems, shown, until
+from tests.studio.pages import field, open_panel, problems, shown, until
+
+ROBOT = "acrobot_small"
 
 OFFSET = 0.004
 """By which the first cable's length is wrong in the log of the test [m]."""
 
 
-@pytest.fixture
-def folder(tmp_path):
+@pytest.fixture(scope="module")
+def work(tmp_path_factory):
     """With a log of lengths at the poses of a small circle, a gap, and a wrong zero of C1."""
-    robot = load_robot("acrobot_small")
+    folder = tmp_path_factory.mktemp("work")
+    robot = load_robot(ROBOT)
     cables, home = robot.cable_set(), robot.home.transform()
     times = np.r_[0.0:1.0:0.05, 3.0:4.0:0.05]
     heads = ["time_s", "x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"]
@@ -36,12 +38,13 @@ def folder(tmp_path):
         lengths[0] += OFFSET
         cells = [t, *p, *row[:4], *lengths]
         lines.append(",".join(f"{value:.9g}" for value in cells))
-    (tmp_path / "circle.csv").write_text("\n".join(lines) + "\n")
-    return tmp_path
+    (folder / "circle.csv").write_text("\n".join(lines) + "\n")
+    (folder / "notes.txt").write_text("not a log\n")
+    return folder
 
 
-def test_contents_are_those_of_the_front_door(folder):
-    found, log = log_contents(folder / "circle.csv"), import_log(folder / "circle.csv").log
+def test_contents_are_those_of_the_front_door(work):
+    found, log = log_contents(work / "circle.csv"), import_log(work / "circle.csv").log
     assert dict(found.facts)["rows"] == log.row_report().words()
     assert "1 gaps" in dict(found.facts)["rows"]
     assert [row[0] for row in found.columns] == list(log.columns)
@@ -49,58 +52,47 @@ def test_contents_are_those_of_the_front_door(folder):
     assert found.picture.startswith(b"\x89PNG")
 
 
-def test_a_run_leaves_a_log_that_is_offered(folder, alone):
-    shutil.copytree(alone, folder / "runs" / "short")
-    assert log_files(WorkingFolder(folder)) == ["circle.csv", "runs/short/log.csv"]
+def test_a_run_leaves_a_log_that_is_offered(work, alone, tmp_path):
+    shutil.copy(work / "circle.csv", tmp_path)
+    shutil.copytree(alone, tmp_path / "runs" / "short")
+    assert log_files(WorkingFolder(tmp_path)) == ["circle.csv", "runs/short/log.csv"]
 
 
-def test_a_comparison_has_the_rows_of_the_table(folder, beside):
+def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
     found = read_comparison(beside)
-    assert found.robot == "acrobot_small"
+    assert found.robot == ROBOT
     columns = 1 + sum(len(chart.series) for chart in found.charts)
     assert all(len(row) == columns for row in found.rows)
     table = np.genfromtxt(beside / "replay.csv", delimiter=",", names=True)
     wanted = 1e3 * (table["C1_length_m"] - table["C1_predicted_length_m"])
     assert [row[1] for row in found.rows] == pytest.approx(wanted)
-    (beside / "replay.csv").read_text()
-    broken = folder / "broken"
+    broken = tmp_path / "broken"
     shutil.copytree(beside, broken)
     (broken / "replay.csv").write_text("time_s\n0\n")
     with pytest.raises(CdprError, match="broken: cannot be read"):
         read_comparison(broken)
 
 
-def test_a_log_is_compared_with_the_open_robot_as_the_command_does(folder):
-    async def look():
-        async with opened_page(folder, "acrobot_small") as (user, bench, _):
-            user.find(marker="tab-logs").click()
-            await until(lambda: shown(user, "logs-empty"))
-            field(user, "log").value = "circle.csv"
-            await until(lambda: "1 gaps" in _content(user, "log-facts"))
-            assert "C8_length_m" in _content(user, "log-channels")
-            user.find(marker="compare-log").click()
-            await until(lambda: bench.results.subject("log") is not None)
-            about = bench.results.subject("log")
-            assert about.digest == bench.subject.digest
-            name = _views[bench].board.shown
-            told = json.loads((folder / "logs" / name / "summary.json").read_text())
-            assert told["cables"]["C1"]["length_offset_m"] == pytest.approx(OFFSET, abs=1e-6)
-            assert "<td>4</td>" in _content(user, "log-numbers")
-
-    asyncio.run(look())
+async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, bench, work):
+    open_panel(user, "logs")
+    await until(lambda: shown(user, "logs-empty"))
+    field(user, "log").value = "circle.csv"
+    await until(lambda: "1 gaps" in _content(user, "log-facts"))
+    assert "C8_length_m" in _content(user, "log-channels")
+    user.find(marker="compare-log").click()
+    await until(lambda: bench.results.subject("log") is not None)
+    about = bench.results.subject("log")
+    assert about.digest == bench.subject.digest
+    name = _views[bench].board.shown
+    told = json.loads((work / "logs" / name / "summary.json").read_text())
+    assert told["cables"]["C1"]["length_offset_m"] == pytest.approx(OFFSET, abs=1e-6)
+    assert "<td>4</td>" in _content(user, "log-numbers")
 
 
-def test_a_file_that_is_no_log_is_said(folder):
-    (folder / "notes.txt").write_text("not a log\n")
-
-    async def look():
-        async with opened_page(folder, "acrobot_small") as (user, _, _):
-            user.find(marker="tab-logs").click()
-            await until(lambda: shown(user, "log"))
-            field(user, "log").value = "notes.txt"
-            await until(lambda: any("notes.txt" in words for words in problems(user)))
-
-    asyncio.run(look())
+async def test_a_file_that_is_no_log_is_said(user):
+    open_panel(user, "logs")
+    field(user, "log").value = "notes.txt"
+    await until(lambda: any("notes.txt" in words for words in problems(user)))
 
 
 def _content(user, name):

@@ -5,10 +5,7 @@ import io
 import shutil
 import sys
 import zipfile
-from contextlib import suppress
-
-import pytest
-from nicegui.testing.user_simulation import user_simulation
+from contextlib import asynccontextmanager
 
 from cdpr_drake.studio.panels.run import run_panel
 from cdpr_drake.studio.workbench.job import JobState
@@ -16,115 +13,82 @@ from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-
-LONGEST = 1200.0
-"""Nothing here takes as long, unless it hangs [s]."""
+from tests.studio.pages import field, shown, simulated, until
 
 
-@pytest.fixture
-def bench(tmp_path):
+@asynccontextmanager
+async def opened_panel(folder):
+    """A user who has opened the panel, and the workbench of it."""
     jobs = JobManager(at_once=1)
-    made = Workbench(WorkingFolder(tmp_path), "acrobot_small", "acrobot_pbvs", jobs=jobs)
-    made.draw = lambda draw, done=None: None  # no scene: that is tested in a browser
-    yield made
-    jobs.close()
+    bench = Workbench(WorkingFolder(folder), "acrobot_small", "acrobot_pbvs", jobs=jobs)
+    bench.draw = lambda draw, done=None: None  # no scene: that is tested in a browser
+    try:
+        async with simulated(lambda: run_panel(bench)) as user:
+            await until(lambda: shown(user, "field-duration"))
+            yield user, bench
+    finally:
+        jobs.close()
 
 
-def acted(bench, act):
-    """Opens the panel as a user does, and lets `act` do something with it."""
-
-    async def session():
-        async with user_simulation(root=lambda: run_panel(bench)) as user:
-            await user.open("/")
-            await until(lambda: one(user, "field-duration"))
-            await act(user)
-
-    asyncio.run(session())
+def says(user, name, words):
+    return shown(user, name) and words in field(user, name).text
 
 
-async def until(holds):
-    """Waits for what the page does by itself."""
-    for _ in range(int(LONGEST / 0.05)):
-        with suppress(AssertionError):  # of what is not shown yet
-            if holds():
-                return
-        await asyncio.sleep(0.05)
-    raise AssertionError("the page did not do it")
-
-
-def one(user, marker):
-    """The element of a name."""
-    return next(iter(user.find(marker=marker).elements))
-
-
-def test_a_wrong_value_is_said_at_its_field_and_nothing_starts(bench):
-    async def act(user):
-        field = one(user, "field-duration")
-        field.value = "-3"
-        await until(lambda: field.props.get("error"))
-        assert "found -3; accepted: a number > 0 [s]" in field.props["error-message"]
+async def test_a_wrong_value_is_said_at_its_field_and_nothing_starts(tmp_path):
+    async with opened_panel(tmp_path) as (user, bench):
+        duration = field(user, "field-duration")
+        duration.value = "-3"
+        await until(lambda: duration.props.get("error"))
+        assert "found -3; accepted: a number > 0 [s]" in duration.props["error-message"]
         user.find(marker="start").click()
         await asyncio.sleep(0.3)
         assert bench.jobs.jobs == []
-        field.value = "0.2"
-        await until(lambda: not field.props.get("error"))
-
-    acted(bench, act)
+        duration.value = "0.2"
+        await until(lambda: not duration.props.get("error"))
 
 
-def test_a_run_that_fails_is_a_message_and_the_next_one_starts(bench, monkeypatch):
+async def test_a_run_that_fails_is_a_message_and_the_next_one_starts(tmp_path, monkeypatch):
     words = "import sys; print('cdpr: no space left on device', file=sys.stderr); sys.exit(2)"
     monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", words))
-
-    async def act(user):
-        for _ in range(2):
-            before = len(bench.jobs.jobs)
+    async with opened_panel(tmp_path) as (user, bench):
+        for count in (1, 2):
             user.find(marker="start").click()
-            await until(lambda before=before: len(bench.jobs.jobs) > before)
+            await until(lambda count=count: len(bench.jobs.jobs) == count)
             await until(lambda: bench.jobs.jobs[-1].state == JobState.FAILED)
-            await until(lambda: "no space left on device" in one(user, "run-problem").text)
-            assert one(user, "run-state").text == "failed"
-
-    acted(bench, act)
+            await until(lambda: says(user, "run-problem", "no space left on device"))
+            assert field(user, "run-state").text == "failed"
 
 
-def test_a_finished_run_is_looked_at_compared_and_downloaded(bench, alone, tmp_path):
+async def test_a_finished_run_is_looked_at_compared_and_downloaded(alone, tmp_path):
     for name in ("first", "second"):
         shutil.copytree(alone, tmp_path / "runs" / name)
-
-    async def act(user):
-        await until(lambda: "folder first" in one(user, "run").options)
-        one(user, "run").value = "folder first"
-        await until(lambda: one(user, "outcome").text == "timeout")
-        slider = one(user, "cursor")
-        slider.value = 0.1
-        assert one(user, "camera").props["src"].startswith("data:image/jpeg;base64,")
-        assert list(one(user, "compare").options) == ["none", "folder second"]
-        one(user, "compare").value = "folder second"
-        one(user, "run").value = "folder second"  # which is not compared with itself
-        await until(lambda: list(one(user, "compare").options) == ["none", "folder first"])
-        assert one(user, "compare").value == "none"
-        one(user, "compare").value = "folder first"
-        one(user, "run").value = "folder first"
-        await until(lambda: list(one(user, "compare").options) == ["none", "folder second"])
+    async with opened_panel(tmp_path) as (user, _):
+        await until(lambda: "folder first" in field(user, "run").options)
+        field(user, "run").value = "folder first"
+        await until(lambda: says(user, "outcome", "timeout"))
+        field(user, "cursor").value = 0.1
+        assert field(user, "camera").props["src"].startswith("data:image/jpeg;base64,")
+        compare = field(user, "compare")
+        assert list(compare.options) == ["none", "folder second"]
+        compare.value = "folder second"
+        field(user, "run").value = "folder second"  # which is not compared with itself
+        await until(lambda: list(field(user, "compare").options) == ["none", "folder first"])
+        assert field(user, "compare").value == "none"
+        field(user, "compare").value = "folder first"
+        field(user, "run").value = "folder first"
+        await until(lambda: list(field(user, "compare").options) == ["none", "folder second"])
         user.find(marker="download").click()
-        data = await user.download.next(timeout=LONGEST)
+        data = await user.download.next(timeout=1200.0)
         with zipfile.ZipFile(io.BytesIO(data.content)) as archive:
             assert archive.read("first/log.csv") == (alone / "log.csv").read_bytes()
 
-    acted(bench, act)
 
-
-def test_a_second_tab_and_a_reload_find_the_run(bench, monkeypatch):
+async def test_a_second_tab_and_a_reload_find_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(3600)"))
-
-    async def act(user):
+    async with opened_panel(tmp_path) as (user, _):
         user.find(marker="start").click()
-        await until(lambda: bench.jobs.jobs)
-        await until(lambda: one(user, "run-state").text == "runs")
+        await until(lambda: says(user, "run-state", "runs"))
         await user.open("/")
-        await until(lambda: one(user, "run-state").text == "runs")
+        await until(lambda: says(user, "run-state", "runs"))
         user.find(marker="stop").click()
-        await until(lambda: one(user, "run-state").text == "stopped")
-
-    acted(bench, act)
+        await until(lambda: says(user, "run-state", "stopped"))

@@ -1,16 +1,12 @@
 """Two robots, and two runs, beside each other with their differences."""
 
-import asyncio
 import json
-import shutil
 
 import pytest
 
 from cdpr_drake.analyses.front.tensions import solve_tensions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side, runs_side_by_side
-from cdpr_drake.studio.workbench.yaml_edit import with_value
-from tests.studio.pages import field, opened_page, shown, until
 
 
 def by_name(pairs):
@@ -46,27 +42,3 @@ def test_a_run_beside_another_has_numbers_of_both(alone):
     assert found["tension min [N]"].difference == 0.0
     assert found["outcome"].one == summary["outcome"]
     assert not any("wall time" in name or "drake" in name for name in found)
-
-
-def test_the_panels_show_both(tmp_path, alone):
-    for name in ("first", "second"):
-        shutil.copytree(alone, tmp_path / "runs" / name)
-
-    async def look():
-        async with opened_page(tmp_path, "acrobot_small") as (user, bench, _):
-            field(user, "robot-beside").value = True
-            field(user, "other-robot").value = "acrobot_large"
-            await until(lambda: "platform mass [kg]" in field(user, "robot-pairs").content)
-            before = field(user, "robot-pairs").content
-            bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
-            await until(lambda: field(user, "robot-pairs").content != before)
-            assert "5.25" in field(user, "robot-pairs").content
-            user.find(marker="tab-run").click()
-            await until(lambda: "folder first" in field(user, "run").options)
-            field(user, "run").value = "folder first"
-            await until(lambda: "folder second" in field(user, "compare").options)
-            field(user, "compare").value = "folder second"
-            await until(lambda: shown(user, "both-runs"))
-            assert "final position error [m]" in field(user, "run-pairs").content
-
-    asyncio.run(look())

@@ -159,17 +159,12 @@ BOXES = {
     "closure planar": (lambda: closure("planar"), 800, 0.63, 0.15),
     "closure constrained": (lambda: closure("acrobot_fully_constrained"), 3000, 0.05, 0.46),
     "closure over pulleys": (closure_pulleys, 3000, 0.18, 0.16),
-    "interference, near": (lambda: interference(0.01), 3000, 0.34, 0.5),
-    "interference, far": (lambda: interference(0.04), 3000, 0.14, 0.7),
+    "interference": (lambda: interference(0.01), 3000, 0.34, 0.5),
     "interference, turned": (lambda: interference(0.01, turn=0.01), 10_000, 0.35, 0.5),
-    "interference over pulleys": (lambda: interference(0.02, ends="A"), 3000, 0.26, 0.53),
-    "interference over more pulleys": (lambda: interference(0.02, ends="AB"), 3000, 0.26, 0.53),
+    "interference over pulleys": (lambda: interference(0.02, ends="AB"), 3000, 0.26, 0.53),
     "collision": (lambda: collision("none"), 6000, 0.74, 0.1),
-    "collision, yaw": (lambda: collision("yaw"), 8000, 0.69, 0.07),
     "collision, turned": (lambda: collision("all"), 10_000, 0.68, 0.05),
-    "collision, 0.02 m": (lambda: collision("none", 0.02), 6000, 0.68, 0.15),
     "collision, yaw, 0.02 m": (lambda: collision("yaw", 0.02), 8000, 0.63, 0.11),
-    "cables and solids": (lambda: convex_interference("none", False), 6000, 0.61, 0.12),
     "cables and solids, yaw": (lambda: convex_interference("yaw", False), 8000, 0.58, 0.09),
     "cables over pulleys and solids": (lambda: convex_interference("none", True), 6000, 0.6, 0.11),
     "failure, pushed": (failure, 500, 0.05, 0.0),
@@ -301,7 +296,7 @@ def test_boxes_of_several_kinds_are_those_of_each():
         robot, kinds, WorkspaceGrid(axes, np.zeros((1, 3))), asked=request
     )
     search = box_search(question, robot)
-    boxes = certified_boxes(search, 8000)
+    boxes = certified_boxes(search, 4000)
     assert min(check(boxes, search.tasks)) > 50
     verdicts = [
         judge_all([task], boxes.poses, boxes.halves, boxes.proven)[0] for task in search.tasks

@@ -1,4 +1,4 @@
-"""Proofs of boxes keep their promises at random, and without any one of their terms they do not."""
+"""Proofs of boxes keep their promises at random poses and corners of random boxes."""
 
 from dataclasses import replace
 
@@ -65,6 +65,9 @@ def off(random, size, shape=3):
 # Clearances of cables from each other and from boxes.
 
 CLEARANCES = (box_pair_clearance_kernel, box_clearance_kernel)
+COLLISIONS = (box_collision_kernel,)
+PULLEYS = (box_pulleys_kernel,)
+WRENCHES = (box_inside_kernel, box_outside_kernel, box_expansion_kernel)
 EXTENT = 5.0
 
 
@@ -149,60 +152,19 @@ def box_broken(functions, random):
     return False
 
 
-def clearance_broken(functions, tries):
+def clearances_broken(functions):
     random = np.random.default_rng(0)
-    return any(
-        pair_broken(functions, random) or box_broken(functions, random) for _ in range(tries)
-    )
-
-
-PAIR_MOVES = "value -= half[k] * abs(dot(n, moves[k]) + dot(nk[k], Q))"
-BOX_MOVES = "moved += share * half[k] * abs(dot(axis, moves[k]))"
-CLEARANCE_MUTANTS = [
-    (box_pair_clearance_kernel, PAIR_MOVES, PAIR_MOVES + " if k < 3 else 0.0"),
-    (box_pair_clearance_kernel, PAIR_MOVES, PAIR_MOVES + " if k > 2 else 0.0"),
-    (box_pair_clearance_kernel, "need = (apart + error) * longest", "need = apart * longest"),
-    (box_pair_clearance_kernel, "still = corner == 0", "still = True or corner == 0"),
-    (box_pair_clearance_kernel, "far += step", "pass"),
-    (
-        box_pair_clearance_kernel,
-        "far = np.sqrt(dot(n, n)) + split * size",
-        "far = np.sqrt(dot(n, n))",
-    ),
-    (box_clearance_kernel, BOX_MOVES, BOX_MOVES + " if k < 3 else 0.0"),
-    (box_clearance_kernel, BOX_MOVES, "pass"),
-    (
-        box_clearance_kernel,
-        "most = free * largest_swing(n, q, moves, half, numbers, shortest, change, size)",
-        "most = 0.0",
-    ),
-    (
-        box_clearance_kernel,
-        "return (first + 2.0 * errors) / length * (1.0 + ROUNDING) + second + ROUNDING",
-        "return 0.0",
-    ),
-    (box_clearance_kernel, "Q[k] -= to * box[3 * k + a]", "pass"),
-    (box_clearance_kernel, "size += swing(moves, half, numbers)", "pass"),
-]
-
-
-def test_proofs_of_clearances_are_not_broken():
-    assert not clearance_broken(functions_of(CLEARANCES), 600)
-
-
-@pytest.mark.parametrize("mutant", CLEARANCE_MUTANTS, ids=lambda row: row[1])
-def test_proofs_of_clearances_need_their_terms(mutant):
-    assert clearance_broken(functions_of(CLEARANCES, mutant), 3000)
+    return any(pair_broken(functions, random) or box_broken(functions, random) for _ in range(1500))
 
 
 # Collisions of convex shapes.
 
 
-def collision_broken(functions, tries=3000):
+def collisions_broken(functions):
     """True if the judge breaks a promise on random boxes about random shapes."""
     random = np.random.default_rng(0)
     body = ConvexShape.box_at([0, 0, 0.05], [0.2, 0.3, 0.1])
-    for _ in range(tries):
+    for _ in range(1500):
         turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
         other = ConvexShape.box_at(np.zeros(3), random.uniform(0.05, 0.3, 3), turn)
         other = replace(other, radius=random.choice([0.0, 0.05]))
@@ -224,34 +186,14 @@ def collision_broken(functions, tries=3000):
     return False
 
 
-COLLISION_MUTANTS = [
-    ("        least -= blame[j]\n", "        least -= 0.0\n"),
-    ("here -= abs(dot(n, rates[j]))", "here -= 0.0"),
-    ("here += abs(dot(n, rates[j]))", "here += 0.0"),
-    ("        least -= half[j] * abs(n[j])\n", "        least -= 0.0\n"),
-    ("wide[a] = half[a] + eps[a] + slack", "wide[a] = eps[a] + slack"),
-    ("wide[a] = half[a] + eps[a] + slack", "wide[a] = half[a] + slack"),
-    ("rho = clearance + body_radii[b] + radii[o]", "rho = clearance + body_radii[b]"),
-]
-
-
-def test_proofs_of_collisions_are_not_broken():
-    assert not collision_broken(vars(box_collision_kernel), 1000)
-
-
-@pytest.mark.parametrize("mutant", COLLISION_MUTANTS, ids=lambda row: row[1])
-def test_proofs_of_collisions_need_their_terms(mutant):
-    assert collision_broken(as_python(box_collision_kernel, mutant))
-
-
 # Where cables over pulleys run.
 
 
-def pulleys_broken(functions, ends, first_order, tries, seed=0):
+def pulleys_broken(functions, ends="A", first_order=True):
     """True if a tangent point lies elsewhere than a bound of a box says, where cables run."""
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(0)
     count = 0
-    for _ in range(tries):
+    for _ in range(400):
         exits = random.uniform(-1.0, 1.0, (3, 1)) + np.array([[1.5], [0.0], [1.0]])
         cables = CableSet.make(exits, random.uniform(-0.2, 0.2, (3, 1)), 1.0)
         rows = pulleys_at(cables, ends, random, (0.3, 0.1)).packed()
@@ -285,33 +227,15 @@ def pulleys_broken(functions, ends, first_order, tries, seed=0):
                 return True
             if np.linalg.norm(anchor - points[0, 3:]) > known[0, ANCHOR] + TINY:
                 return True
-    assert count > tries / 4
+    assert count > 100
     return False
-
-
-PULLEY_MUTANTS = [
-    ("rho -= nearer + reach + slip", "rho += nearer + reach", ("A", False)),
-    ("a = max(r / L, 2.0 * r / rho)", "a = 0.3 * r / L", ("A", False)),
-    ("c = max(s / L, 2.0 * s / rho)", "c = 0.3 * s / L", ("B", True)),
-    ("off[i, BEND], off[i, EXIT] = bend,", "off[i, BEND], off[i, EXIT] = 0.1 * bend,", ("A", True)),
-    ("along, beside = r / L,", "along, beside = -r / L,", ("A", True)),
-    ("errors[0] + 2.0 * r, errors", "errors[0] + 0.5 * r, errors", ("A", True)),
-    ("+ c * (exit_off + moved_A)", "", ("AB", True)),
-    ("exit_off = (1.0 + a) * errors[0] + a * (moved_B", "exit_off = a * (moved_B", ("A", False)),
-]
 
 
 @pytest.mark.parametrize(
     ("ends", "first_order"), [("A", True), ("A", False), ("B", True), ("AB", True), ("AB", False)]
 )
 def test_tangent_points_lie_where_a_box_says(ends, first_order):
-    assert not pulleys_broken(vars(box_pulleys_kernel), ends, first_order, 500)
-
-
-@pytest.mark.parametrize(("old", "new", "where"), PULLEY_MUTANTS)
-def test_bounds_of_tangent_points_need_their_terms(old, new, where):
-    mutant = as_python(box_pulleys_kernel, (old, new))
-    assert any(pulleys_broken(mutant, *where, 250, seed) for seed in (0, 1, 2))
+    assert not pulleys_broken(vars(box_pulleys_kernel), ends, first_order)
 
 
 def test_bounds_of_tangent_points_shrink_with_the_box_and_the_first_order_is_that():
@@ -336,7 +260,6 @@ def test_bounds_of_tangent_points_shrink_with_the_box_and_the_first_order_is_tha
 
 # Wrenches that cables can balance.
 
-WRENCHES = (box_inside_kernel, box_outside_kernel, box_expansion_kernel)
 SETTINGS = {
     "exact": ((0.0, 0.0), False),
     "exits": ((0.02, 0.0), False),
@@ -393,15 +316,15 @@ def proven(functions, case, errors, closure, pose, half):
     return -int(functions["proves_outside"](normals[worst].copy(), *rests, np.empty(6)))
 
 
-def wrenches_broken(functions, setting, seed=0):
+def wrenches_broken(functions, setting="exact"):
     """True if a proven box has a pose, with points that are off, where it is not so.
 
-    At each of 14 poses the largest box is looked at that the proof accepts.
+    At each of 60 poses the largest box is looked at that the proof accepts.
     """
     (errors, closure), case = SETTINGS[setting], wrench_case()
-    errors, random = np.array(errors), np.random.default_rng(seed)
+    errors, random = np.array(errors), np.random.default_rng(0)
     signs = np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, -1).T
-    for _ in range(14):
+    for _ in range(60):
         pose = np.zeros(6)
         pose[:2], pose[2] = random.uniform(-0.45, 0.45, 2), 0.3
         pose[5] = random.uniform(-0.5, 0.5)
@@ -429,41 +352,30 @@ def wrenches_broken(functions, setting, seed=0):
     return False
 
 
-WRENCH_MUTANTS = [
-    (box_inside_kernel, "off = first + along", "off = along", "exact", 0),
-    (box_inside_kernel, "lower[i] + off <= middle", "lower[i] <= middle", "exact", 0),
-    (box_inside_kernel, "bound += rest[3 + k, i] * largest[i]", "bound += 0.0", "exits", 0),
-    (box_inside_kernel, "first += half[j] * abs(", "first += half[j] * (", "exact", 0),
-    (box_inside_kernel, "(rho[k] + more)", "0.0", "exact", 0),
-    (box_expansion_kernel, "_cross(b, vk, y)", "_cross(vk, b, y)", "exact", 0),
-    (box_expansion_kernel, "+ off[i, EXIT] + off[i, ANCHOR]", "+ off[i, ANCHOR]", "exits", 0),
-    (
-        box_expansion_kernel,
-        "E_b = 0.5 * s * s * arm + off[i, ANCHOR]",
-        "E_b = 0.5 * s * s * arm",
-        "anchors",
-        1,
-    ),
-    (box_outside_kernel, "loss += half[j] * abs(rate[j])", "loss += 0.0", "exact", 1),
-    (
-        box_outside_kernel,
-        "loss += max(upper[i] * highest, lower[i] * highest)",
-        "loss += 0.0",
-        "exact",
-        0,
-    ),
-    (box_outside_kernel, "if abs(q) > width[i]:", "if True:", "exits", 1),
-    (box_outside_kernel, "f += part[k] * rest[3 + k, i]", "f += 0.0", "closure, exits", 1),
-    (box_outside_kernel, "f += half[j] * half[o] * abs(value)", "f += 0.0", "closure", 0),
-]
-"""Module, old and new words, and with which setting and seed it is seen."""
-
-
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_proofs_of_wrenches_are_not_broken(setting):
     assert not wrenches_broken(functions_of(WRENCHES), setting)
 
 
-@pytest.mark.parametrize(("module", "old", "new", "setting", "seed"), WRENCH_MUTANTS)
-def test_proofs_of_wrenches_need_their_terms(module, old, new, setting, seed):
-    assert wrenches_broken(functions_of(WRENCHES, (module, old, new)), setting, seed)
+# All of these.
+
+
+@pytest.mark.parametrize(
+    ("broken", "modules"), [(clearances_broken, CLEARANCES), (collisions_broken, COLLISIONS)]
+)
+def test_proofs_of_distances_are_not_broken(broken, modules):
+    assert not broken(functions_of(modules))
+
+
+@pytest.mark.parametrize(
+    ("broken", "modules", "old", "new"),
+    [
+        (clearances_broken, CLEARANCES, "(apart + error) * longest", "apart * longest"),
+        (collisions_broken, COLLISIONS, "body_radii[b] + radii[o]", "body_radii[b]"),
+        (pulleys_broken, PULLEYS, "along, beside = r / L,", "along, beside = -r / L,"),
+        (wrenches_broken, WRENCHES, "(rho[k] + more)", "0.0"),
+    ],
+)
+def test_these_checks_see_a_term_that_is_missing(broken, modules, old, new):
+    """Of the first module; `python -m tests.mutants` tries more of them."""
+    assert broken(functions_of(modules, (modules[0], old, new)))

@@ -30,7 +30,7 @@ from cdpr_drake.workspaces.proven_sets import PoseSets
 from cdpr_drake.workspaces.single_failure import cases_after_breaks, without_cable
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.workspaces.volume import workspace_volume
-from tests.workspaces.test_hull import BOX, CENTER, ball
+from tests.workspaces.test_grids import BOX, CENTER, ball
 from tests.workspaces.test_proven_sets import made_sets
 from tests.workspaces.workspace_cases import frame_box, random_poses, robot_case
 

@@ -131,13 +131,22 @@ def scene(
 Attack = tuple[str, Callable[[CalibrationLog], CalibrationLog]]
 
 
-def _scaled(field: str, which: Callable[[np.ndarray], object], factor: float) -> Callable:
+def _spoilt(field: str, change: Callable[[np.ndarray], None]) -> Callable:
+    """What changes a copy of the readings."""
+
     def spoil(log: CalibrationLog) -> CalibrationLog:
         values = getattr(log, field).copy()
-        values[which(values)] *= factor
+        change(values)
         return replace(log, **{field: values})
 
     return spoil
+
+
+def _scaled(field: str, which: Callable[[np.ndarray], object], factor: float) -> Callable:
+    def change(values: np.ndarray) -> None:
+        values[which(values)] *= factor
+
+    return _spoilt(field, change)
 
 
 def _rows(count: int, share: float, seed: int | None) -> np.ndarray:
@@ -147,34 +156,28 @@ def _rows(count: int, share: float, seed: int | None) -> np.ndarray:
 
 
 def _swapped(field: str, k: int = 0, n: int = 1, share: float = 1.0, seed: int = 1) -> Callable:
-    def spoil(log: CalibrationLog) -> CalibrationLog:
-        values = getattr(log, field).copy()
+    def change(values: np.ndarray) -> None:
         rows = _rows(len(values), share, seed)[:, None]
         values[rows, [k, n]] = values[rows, [n, k]]
-        return replace(log, **{field: values})
 
-    return spoil
+    return _spoilt(field, change)
 
 
 def _late(field: str, rows: int, cables: object) -> Callable[[CalibrationLog], CalibrationLog]:
-    def spoil(log: CalibrationLog) -> CalibrationLog:
-        values = getattr(log, field).copy()
-        values[rows:, cables] = values[:-rows, cables]
-        return replace(log, **{field: values})
+    def change(values: np.ndarray) -> None:
+        values[rows:, cables] = values[:-rows, cables].copy()
 
-    return spoil
+    return _spoilt(field, change)
 
 
 def _added(field: str, cable: int, course: Callable[[np.ndarray], np.ndarray]) -> Callable:
     """A cable's readings off by a share of their mean, which varies over the log, 0 to 1."""
 
-    def spoil(log: CalibrationLog) -> CalibrationLog:
-        values = getattr(log, field).copy()
+    def change(values: np.ndarray) -> None:
         mean = np.nanmean(np.abs(values[:, cable]))
         values[:, cable] += mean * course(np.linspace(0.0, 1.0, len(values)))
-        return replace(log, **{field: values})
 
-    return spoil
+    return _spoilt(field, change)
 
 
 def _turned_angles(axis: int, share: float, seed: int) -> Callable:

@@ -16,11 +16,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import (
-    FreeMotionTask,
-    FreeSigmas,
-    fit_free_motion,
-)
+from cdpr_drake.analyses.calibration.free_motion import FreeMotionTask, FreeSigmas, fit_free_motion
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
@@ -52,18 +48,13 @@ TRUE = {
 
 def soft(group):
     """IRMA4U on cables as soft as its log says, for steps of two milliseconds; as it is."""
-    robot = load_robot("irma4u")
-    does = None
+    robot, does, rubs = load_robot("irma4u"), None, None
+    true = {name.partition(".")[2]: value for name, value in TRUE.get(group, {}).items()}
     if group in ("stiffening", "creep"):
-        does = BehaviourSettings(
-            **{name.removeprefix("all."): value for name, value in TRUE[group].items()}
-        )
+        does = BehaviourSettings(**true)
+    elif group == "hysteresis":
+        rubs = HysteresisSettings(**true)
     cable = replace(robot.cable, youngs_modulus=3e10, retardation_time=0.004, behaviour=does)
-    rubs = None
-    if group == "hysteresis":
-        rubs = HysteresisSettings(
-            **{name.removeprefix("hysteresis."): value for name, value in TRUE[group].items()}
-        )
     return replace(robot, cable=cable, platform=replace(robot.platform, hysteresis=rubs))
 
 
@@ -103,10 +94,8 @@ def plant_swing(group):
     return poses, tensions
 
 
-def noisy_log(group, seed):
-    """The swing with the noise of a seed."""
-    random = np.random.default_rng([seed, 34])
-    poses, tensions = plant_swing(group)
+def noisy(poses, tensions, random):
+    """A log of pose rows, shape (k, 7) or more, and tensions, with noise."""
     turns = Rotation.from_quat(poses[:, [1, 2, 3, 0]])
     turns = turns * Rotation.from_rotvec(NOISE.turn * random.standard_normal((COUNT, 3)))
     places = poses[:, 4:7] + NOISE.position * random.standard_normal((COUNT, 3))
@@ -119,13 +108,17 @@ def noisy_log(group, seed):
     )  # fmt: skip
 
 
+def fitted(robot, unknown, log):
+    """What a fit of the whole log finds."""
+    whole = ((0.0, (COUNT - 1) / RATE),)
+    task = FreeMotionTask(robot=robot, unknown=unknown, stretches=whole, sigmas=NOISE, start=START)
+    return fit_free_motion(task, log)
+
+
 def identified(group, seed):
-    """What the fit of a seed found."""
-    task = FreeMotionTask(
-        robot=believed(group), unknown=(group,), stretches=((0.0, (COUNT - 1) / RATE),),
-        sigmas=NOISE, start=START,
-    )  # fmt: skip
-    return fit_free_motion(task, noisy_log(group, seed))
+    """What the fit of a swing with the noise of a seed found."""
+    log = noisy(*plant_swing(group), np.random.default_rng([seed, 34]))
+    return fitted(believed(group), (group,), log)
 
 
 def off_by(group, found):

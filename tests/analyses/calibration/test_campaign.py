@@ -13,7 +13,9 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 
-CHANGES = ("camera.kind=projected", "perturbations.exit_points=0.01")
+CHANGES = (
+    "camera.kind=projected", "perturbations.exit_points=0.01", "integration.engine=compiled",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

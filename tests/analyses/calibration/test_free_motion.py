@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.calibration.free_motion import SMALL, steps_within
 from cdpr_drake.analyses.calibration.free_motion_balance import PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeMotionModel
 from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
@@ -41,12 +42,12 @@ def spans_words(spans):
 def found(tmp_path_factory):
     """The command on two fitted swings and one that is held out: exit code, JSON and folder.
 
-    Of what is fitted the first 1.2 s are enough.
+    Of what is fitted the first 0.8 s are enough.
     """
     folder = tmp_path_factory.mktemp("swings")
     spans = swings.write(folder / "log.csv", (0, 1, 2))
     believed = swings.believed_file(folder)
-    fitted = spans_words((first, first + 1.2) for first, _ in spans[:2])
+    fitted = spans_words((first, first + 0.8) for first, _ in spans[:2])
     args = ["identify", believed, str(folder / "log.csv"), "--free", fitted]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
     args += ["--sigma", f"turn={swings.NOISE['turn']},tension={swings.NOISE['tension']}", "--json"]
@@ -167,6 +168,16 @@ def test_states_a_time_earlier_are_those_of_the_motion():
     off = turns.inv() * Rotation.from_quat(true[:, [1, 2, 3, 0]])
     assert np.max(off[1:].magnitude()) < HERMITE_TOLERANCE
     assert np.max(np.abs(places[1:] - true[1:, 4:7])) < HERMITE_TOLERANCE
+
+
+def test_steps_for_slopes_stay_within_bounds():
+    """A retardation time near zero would become negative, which no cable has."""
+    x, least, largest = np.array([[1e-7, 0.5, 1.0], [0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    down, up = steps_within(x, least, largest)
+    assert down == pytest.approx([1e-7, SMALL, SMALL])
+    assert up == pytest.approx([SMALL, SMALL, 0.0])
+    assert np.all(x - down >= least)
+    assert np.all(x + up <= largest)
 
 
 def test_dominant_frequency_is_that_of_a_sine():

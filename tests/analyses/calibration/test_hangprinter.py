@@ -50,11 +50,14 @@ def believed():
     return replace(robot, cables=cables, winch=replace(robot.winch, drum_radius=0.0697173))
 
 
-def calibrated(**more):
+def read():
+    return read_log(LOG, "ABCD")
+
+
+def calibrated(log=LOG, robot=None, **more):
     """A calibration whose motors stood at zero at the origin."""
-    return cdpr.calibrate(
-        believed(), LOG, UNKNOWN, sigmas=EXACT, zero=RigidTransform(), outliers=False, **more
-    )
+    how = {"sigmas": EXACT, "zero": RigidTransform(), "outliers": False, **more}
+    return cdpr.calibrate(robot or believed(), log, UNKNOWN, **how)
 
 
 @pytest.fixture(scope="module")
@@ -70,15 +73,14 @@ def free():
 def test_the_log_that_import_log_writes_has_the_same_numbers(tmp_path):
     """The way that the guide goes: recorder's file, import-log, calibrate."""
     cdpr.import_log(LOG).write(tmp_path / "series.csv")
-    cables = [cable.name for cable in load_robot("hangprinter_4").cables]
-    direct, imported = read_log(LOG, cables), read_log(tmp_path / "series.csv", cables)
+    direct, imported = read(), read_log(tmp_path / "series.csv", "ABCD")
     np.testing.assert_allclose(imported.angles, direct.angles, rtol=1e-12)  # deg, as written
     np.testing.assert_allclose(imported.points, direct.points, rtol=1e-12)
 
 
 def test_a_log_of_motor_angles_without_a_zero_is_refused_with_what_is_missing():
     with pytest.raises(CalibrationError, match="does not determine") as caught:
-        cdpr.calibrate("hangprinter_4", read_log(LOG, "ABCD").only(np.arange(12)))
+        cdpr.calibrate("hangprinter_4", read().only(np.arange(12)))
     assert any("--zero home" in note for note in caught.value.__notes__)
 
 
@@ -137,7 +139,7 @@ def test_rows_that_cannot_be_held_out_are_refused(words):
 
 
 def test_positions_without_rotations_are_read():
-    log = read_log(LOG, ["A", "B", "C", "D"])
+    log = read()
     assert log.poses is None
     assert log.points.shape == (ROWS, 3)
     assert np.isfinite(log.points[:9]).all()
@@ -147,42 +149,25 @@ def test_positions_without_rotations_are_read():
 
 
 def test_motors_whose_sign_is_turned_are_no_fit_and_named():
-    log = read_log(LOG, ["A", "B", "C", "D"])
+    log, robot = read(), load_robot("hangprinter_4")
     turned = replace(log, angles=-log.angles)
-    with pytest.raises(CalibrationError, match="176 of 176 motor angles fit with the sign turned"):
-        cdpr.calibrate(
-            load_robot("hangprinter_4"), turned, UNKNOWN, sigmas=EXACT, zero=RigidTransform()
-        )
-    found = cdpr.calibrate(
-        load_robot("hangprinter_4"), turned, UNKNOWN, sigmas=EXACT, zero=RigidTransform(),
-        outliers=False,
-    )  # fmt: skip
+    words = "176 of 176 motor angles fit with the sign turned"
+    with pytest.raises(CalibrationError, match=words):
+        calibrated(turned, robot, outliers=True)
+    found = calibrated(turned, robot)
     assert found.result.status == "misfit"
-    assert "176 of 176 motor angles fit with the sign turned" in found.misfit[0]
+    assert words in found.misfit[0]
 
 
-def test_half_the_readings_of_one_motor_off_are_no_calibration(tmp_path):
+def test_half_the_readings_of_one_motor_off_are_no_calibration():
     """A third too much in every other row: most of what is dropped is what the search chose."""
-    lines = LOG.read_text(encoding="utf-8").splitlines()
-    first = next(k for k, line in enumerate(lines) if line.startswith("A_motor"))
-    for k in range(first + 2, len(lines), 2):
-        angle, *rest = lines[k].split(",")
-        lines[k] = ",".join([str(1.3 * float(angle)), *rest])
-    (tmp_path / "half.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    found = cdpr.calibrate(
-        believed(), tmp_path / "half.csv", UNKNOWN, sigmas=EXACT, zero=RigidTransform()
-    )
-    assert found.result.status == "misfit"
+    log = read()
+    log.angles[1::2, 0] *= 1.3
+    assert calibrated(log, outliers=True).result.status == "misfit"
 
 
-@pytest.mark.parametrize("cable", ["A", "C"])
-def test_a_motor_that_turns_the_other_way_is_named(cable):
-    log = read_log(LOG, ["A", "B", "C", "D"])
-    angles = log.angles.copy()
-    angles[:, "ABCD".index(cable)] *= -1.0
-    words = f"all fits with the sign of the motor angles of {cable} turned"
-    found = cdpr.calibrate(
-        believed(), replace(log, angles=angles), UNKNOWN, sigmas=EXACT, zero=RigidTransform(),
-        outliers=False, bounds={"tracker.[xyz]": 1e-3},
-    )  # fmt: skip
-    assert found.misfit[0] == words
+def test_a_motor_that_turns_the_other_way_is_named():
+    log = read()
+    log.angles[:, 0] *= -1.0
+    found = calibrated(log, bounds={"tracker.[xyz]": 1e-3})
+    assert found.misfit[0] == "all fits with the sign of the motor angles of A turned"

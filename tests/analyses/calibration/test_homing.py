@@ -10,15 +10,24 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import HOMING, default_unknown
+from cdpr_drake.analyses.calibration.calibration_request import (
+    HOMING,
+    CalibrationTask,
+    Sigmas,
+    default_unknown,
+)
+from cdpr_drake.analyses.calibration.calibration_task import calibrate
 from cdpr_drake.analyses.calibration.fit_starts import upright_minima
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.turned_sensors import flipped, upside_down
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
-from tests.analyses.calibration.test_self_calibration import TAUT, three_cables
+
+TAUT = 0.1
+"""Least tension at a pose that is recorded [N]."""
 
 NOISE = 0.1
 """Of the sensors, in parts of what they are taken to miss."""
@@ -26,48 +35,64 @@ NOISE = 0.1
 YAW = 0.4
 """Where the yaw of the log counts from [rad]."""
 
+SIGMAS = Sigmas(lengths=5e-4, swivels=3e-3, moments=0.02, forces=0.1)
+"""Without tension sensors."""
+
 LEAST = 8
 """Poses that tell thirteen unknowns of a robot on three cables."""
 
 
-def recorded():
-    """Three cables hold a platform; lengths and swivels that count from the first row, tensions,
-    tilts; and the poses."""
-    robot = three_cables()
-    model, random = calibration_model(robot), np.random.default_rng(0)
-    X_WP = pose_from_angles(np.array([0.02, 0.03, 0.4]), np.zeros(3))
-    lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
-    poses, tensions = [], []
-    for _ in range(20):
-        l0 = lengths + random.uniform(-0.1, 0.1, 3)
-        rest = equilibrium_near(robot.cable_set(), "elastic", rigid_platform(robot), l0, X_WP)
-        if np.min(rest.tensions) > TAUT:
-            poses.append(rest.X_WP)
-            tensions.append(rest.tensions)
-    numbers = Point(model, Stations.at(poses)).numbers
-    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    tilts[:, 2] -= YAW
-
-    def noisy(values, sigma):
-        return values + NOISE * sigma * random.standard_normal(values.shape)
-
-    counted = noisy(numbers[:, :, 0], HOMING.lengths)
-    turned = noisy(numbers[:, :, 2], HOMING.swivels)
-    log = CalibrationLog(
-        Path("homing"), len(poses), lengths=counted - counted[0], swivels=turned - turned[0],
-        tensions=noisy(np.array(tensions), 0.5), tilts=noisy(tilts, HOMING.tilt),
-    )  # fmt: skip
-    return robot, log, poses
+def three_cables():
+    """ACROBOT on three cables that hold the platform by its corners."""
+    robot = load_robot("acrobot_small")
+    cables = [robot.cables[i] for i in (0, 3, 5)]
+    corners = [np.append(0.055 * np.sign(c.exit_point[:2]), 0.09) for c in cables]
+    held = [replace(c, anchor_point=p) for c, p in zip(cables, corners, strict=True)]
+    return replace(robot, cables=held)
 
 
 @pytest.fixture(scope="module")
-def homing():
-    return recorded()
+def resting():
+    """Poses at which three cables hold a platform at rest, tensions, lengths, swivel angles."""
+    robot, random = three_cables(), np.random.default_rng(0)
+    model, X_WP = calibration_model(robot), RigidTransform([0.02, 0.03, 0.4])
+    lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
+    rests = [
+        equilibrium_near(robot.cable_set(), "elastic", rigid_platform(robot),
+                         lengths + random.uniform(-0.1, 0.1, 3), X_WP)
+        for _ in range(20)
+    ]  # fmt: skip
+    taut = [rest for rest in rests if np.min(rest.tensions) > TAUT][:LEAST]
+    poses = [rest.X_WP for rest in taut]
+    assert len(poses) == LEAST
+    numbers = Point(model, Stations.at(poses)).numbers
+    return poses, np.array([rest.tensions for rest in taut]), numbers[:, :, 0], numbers[:, :, 2]
+
+
+def counted(values, sigma, random):
+    """With noise, counted from the first row."""
+    noisy = values + sigma * random.standard_normal(values.shape)
+    return noisy - noisy[0]
+
+
+@pytest.fixture(scope="module")
+def homing(resting):
+    """Lengths and swivels that count from the first row, tensions, tilts; and the poses."""
+    poses, tensions, lengths, swivels = resting
+    random = np.random.default_rng(1)
+    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
+    tilts[:, 2] -= YAW
+    log = CalibrationLog(
+        Path("homing"), len(poses), lengths=counted(lengths, NOISE * HOMING.lengths, random),
+        swivels=counted(swivels, NOISE * HOMING.swivels, random),
+        tensions=tensions + NOISE * 0.5 * random.standard_normal(tensions.shape),
+        tilts=tilts + NOISE * HOMING.tilt * random.standard_normal(tilts.shape),
+    )  # fmt: skip
+    return three_cables(), log, poses
 
 
 def test_nothing_has_to_be_said(homing):
     robot, log, poses = homing
-    assert len(poses) >= LEAST
     assert default_unknown(robot, log) == ("length_offsets", "swivel_offsets", "tilt_zero.yaw")
     found = cdpr.calibrate(robot, log)
     assert found.result.status == "converged"
@@ -79,9 +104,30 @@ def test_nothing_has_to_be_said(homing):
     assert found.as_dict()["tilt_zeros_rad"][:2] == [0.0, 0.0]
 
 
+def test_three_cables_without_tension_sensors_find_where_they_began(resting):
+    """By winches and swivel angles alone."""
+    (poses, _, lengths, swivels), random = resting, np.random.default_rng(2)
+    log = CalibrationLog(
+        Path("homing"), len(poses), lengths=counted(lengths, SIGMAS.lengths, random),
+        swivels=counted(swivels, SIGMAS.swivels, random),
+    )  # fmt: skip
+    start = RigidTransform([0.1, -0.1, 0.3])
+    task = CalibrationTask(three_cables(), ("length_offsets",), sigmas=SIGMAS, start=start)
+    result = calibrate(task, log).result
+    assert result.status == "converged"
+    assert result.spread() < 2.0
+    far = pose_error(start, poses[0])[0]
+    for X, found in zip(poses, result.stations.poses(), strict=True):
+        distance, angle = pose_error(X, found)
+        assert distance < 5.0 * np.max(result.std[:3])
+        assert distance < 0.3 * far
+        assert np.degrees(angle) < 2.0
+
+
 def test_swivels_whose_sign_is_turned_are_named(homing):
     robot, log, _ = homing
-    found = cdpr.calibrate(robot, replace(log, swivels=-log.swivels), sigmas={"swivels": 3e-3})
+    turned = replace(log, swivels=-log.swivels)
+    found = cdpr.calibrate(robot, turned, sigmas={"swivels": 3e-3}, outliers=False)
     assert found.result.status == "misfit"
     assert "swivel angles fit with the sign turned" in found.misfit[0]
     assert int(found.misfit[0].split()[0]) > 0.9 * log.swivels.size

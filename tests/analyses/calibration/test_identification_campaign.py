@@ -73,10 +73,10 @@ def test_the_logs_that_it_leaves_say_the_same(folder):
     believed = load_robot(str(place / "believed_robot.yaml"))
     log = read_log(place / "excitation.csv", [cable.name for cable in believed.cables])
     task = IdentificationTask(
-        robot=believed, unknown=("mass", "stiffness"), bandwidth=campaign.BANDWIDTH, pulleys=False,
-        sigma_lengths=campaign.SIGMA_LENGTHS, priors={"mass": 1.0},
+        robot=believed, unknown=run.identification.task.unknown, bandwidth=campaign.BANDWIDTH,
+        pulleys=False, sigma_lengths=campaign.SIGMA_LENGTHS,
     )  # fmt: skip
-    again = identify(replace(task, unknown=run.identification.task.unknown, priors={}), log)
+    again = identify(task, log)
     first = run.identification.result
     assert np.max(np.abs(again.result.values - first.values) / first.std) < 1e-6
 

@@ -19,6 +19,11 @@ def written(tmp_path):
     return write
 
 
+@pytest.fixture
+def read(written):
+    return lambda text: read_log(written(text), CABLES)
+
+
 @pytest.mark.parametrize(
     "header",
     [
@@ -32,16 +37,14 @@ def written(tmp_path):
         "measured_lengths_C1_m,measured_lengths_C2_m",
     ],
 )
-def test_headers_of_lengths_are_understood(written, header):
-    log = read_log(written(f"{header}\n1.5,2.5\n"), CABLES)
+def test_headers_of_lengths_are_understood(read, header):
+    log = read(f"{header}\n1.5,2.5\n")
     np.testing.assert_allclose(log.lengths, [[1.5, 2.5]])
 
 
-def test_units_separators_and_gaps(written):
+def test_units_separators_and_gaps(read):
     header = "time_ms;l1_mm;tension_1 (kN);C2_swivel_deg;x_mm;y_mm;z_mm;phi_deg;theta_deg;psi_deg;n"
-    log = read_log(
-        written(f"# robot\n{header}\n" + "0;1,5;0,1;90;1;2;3;0;0;90;7\n10;;;;;;;;;;\n"), CABLES
-    )
+    log = read(f"# robot\n{header}\n" + "0;1,5;0,1;90;1;2;3;0;0;90;7\n10;;;;;;;;;;\n")
     np.testing.assert_allclose(log.time, [0.0, 0.01])
     np.testing.assert_allclose(log.lengths, [[0.0015, np.nan], [np.nan, np.nan]])
     assert log.tensions[0, 0] == 100.0
@@ -52,30 +55,47 @@ def test_units_separators_and_gaps(written):
     assert log.remarks == ("columns not read: n",)
 
 
-def test_rotations_of_every_kind_agree(written):
-    angle = 0.3
-    half = f"{np.cos(angle / 2):.15f},0,0,{np.sin(angle / 2):.15f}"
-    rows = {
-        "qw,qx,qy,qz": half,
-        "phi,theta,psi": f"0,0,{angle}",
-        "rx,ry,rz": f"0,0,{angle}",
-        "roll,pitch,yaw": f"0,0,{angle}",
-    }
-    for header, row in rows.items():
-        log = read_log(written(f"x,y,z,{header}\n1,2,3,{row}\n"), CABLES)
-        expected = pose_from_angles(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, angle]))
-        assert log.poses[0].IsNearlyEqualTo(expected, 1e-9), header
+@pytest.mark.parametrize(
+    ("header", "row"),
+    [
+        ("qw,qx,qy,qz", f"{np.cos(0.15):.15f},0,0,{np.sin(0.15):.15f}"),
+        ("phi,theta,psi", "0,0,0.3"),
+        ("rx,ry,rz", "0,0,0.3"),
+        ("roll,pitch,yaw", "0,0,0.3"),
+    ],
+)
+def test_rotations_of_every_kind_agree(read, header, row):
+    log = read(f"x,y,z,{header}\n1,2,3,{row}\n")
+    expected = pose_from_angles(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.3]))
+    assert log.poses[0].IsNearlyEqualTo(expected, 1e-9)
 
 
-def test_numbers_without_a_header_are_lengths_and_swivel_angles(written):
-    log = read_log(written("0.1 0.2 0.3 0.4\n0.5 0.6 0.7 0.8\n"), CABLES)
+def test_numbers_without_a_header_are_lengths_and_swivel_angles(read):
+    log = read("0.1 0.2 0.3 0.4\n0.5 0.6 0.7 0.8\n")
     np.testing.assert_allclose(log.lengths, [[0.1, 0.2], [0.5, 0.6]])
     np.testing.assert_allclose(log.swivels, [[0.3, 0.4], [0.7, 0.8]])
 
 
-def test_corners_of_tags(written):
+def test_roll_pitch_and_yaw_without_a_position_are_an_inclination(read):
+    log = read("C1_length_m,roll_deg,pitch_deg,yaw_deg\n1,10,20,30\n1,,,\n")
+    assert log.poses is None
+    np.testing.assert_allclose(log.tilts[0], np.radians([10.0, 20.0, 30.0]))
+    assert np.isnan(log.tilts[1]).all()
+    alone = read("C1_length_m,pitch_rad\n1,0.2\n")
+    np.testing.assert_allclose(alone.tilts, [[np.nan, 0.2, np.nan]])
+
+
+def test_other_rotations_without_a_position_are_one_too(read):
+    half = np.radians(15.0)
+    log = read(f"C1_length_m,qw,qx,qy,qz\n1,{np.cos(half)},{np.sin(half)},0,0\n")
+    np.testing.assert_allclose(log.tilts, [[np.radians(30.0), 0.0, 0.0]], atol=1e-12)
+    log = read("C1_length_m,phi_deg,theta_deg,psi_deg\n1,0,0,40\n")
+    np.testing.assert_allclose(log.tilts, [[0.0, 0.0, np.radians(40.0)]], atol=1e-12)
+
+
+def test_corners_of_tags(read):
     names = [f"tag7_{a}{c}_px" for c in range(1, 5) for a in "uv"]
-    log = read_log(written(",".join(names) + "\n" + ",".join("12345678") + "\n"), CABLES)
+    log = read(",".join(names) + "\n" + ",".join("12345678") + "\n")
     np.testing.assert_allclose(log.corners[7], np.arange(1.0, 9.0).reshape(1, 4, 2))
 
 
@@ -99,9 +119,9 @@ def test_corners_of_tags(written):
         ("tag0_u1,tag0_v1\n1,2\n", "2 of 8 coordinates"),
     ],
 )
-def test_bad_logs_are_named(written, text, words):
+def test_bad_logs_are_named(read, text, words):
     with pytest.raises(CalibrationError) as problem:
-        read_log(written(text), CABLES)
+        read(text)
     assert words in str(problem.value)
     assert "accepted" in str(problem.value)
     assert len(str(problem.value)) <= 500

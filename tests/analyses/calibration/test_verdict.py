@@ -36,13 +36,12 @@ def result(**given):
 )
 def test_residuals_of_three_sigmas_are_a_fit_and_more_are_none(spread, degrees, fits):
     """Without a degree of freedom there is nothing to tell it by."""
+    why = (
+        f"residuals are {spread:g} sigmas, root mean square; accepted: at most 3",
+        "largest: row 8, length of cable 2, off by 0.05 m, 50 sigmas",
+    )
     of = result(chi_square=spread**2 * degrees, degrees=degrees)
-    if fits:
-        assert misfits(of) == ()
-    else:
-        why, largest = misfits(of)
-        assert why == f"residuals are {spread:g} sigmas, root mean square; accepted: at most 3"
-        assert largest == "largest: row 8, length of cable 2, off by 0.05 m, 50 sigmas"
+    assert misfits(of) == (() if fits else why)
 
 
 @pytest.mark.parametrize(

@@ -1,3 +1,1 @@
 """Tests of `cdpr_drake.analyses.design`."""
-
-"""Tests of `cdpr_drake.analyses.design`."""

@@ -69,7 +69,7 @@ class Answer:
         return next(found, "")
 
 
-def poses_of(robot, seed=0, count=20):
+def poses_of(robot, seed=0, count=10):
     """Level poses over most of the frame, and at both sides of the edge of what is held, as X_WP.
 
     With fewer cables than degrees of freedom: poses of rest instead of those at the edge.
@@ -78,7 +78,7 @@ def poses_of(robot, seed=0, count=20):
     lower, upper = (np.array(corner, float) for corner in robot.reach())
     home, size = robot.home.transform(), upper - lower
     axes = []
-    for k, points in zip(range(3), (3, 2, 2), strict=True):
+    for k, points in zip(range(3), (2, 2, 1), strict=True):
         middle = float(home.translation()[k])
         if size[k] <= 0.0:
             axes.append([lower[k]])

@@ -22,6 +22,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.stability.verdict import VerdictOptions
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+from tests.cli.conftest import only
 from tests.messages import printed
 
 
@@ -54,6 +55,13 @@ def test_workspaces(planar):
     one_line(lambda: cdpr.compute_workspace(planar, forse=1.0), "forse", "force")
 
 
+@pytest.fixture
+def few_pictures():
+    with only("planes.svg", "workspace.html"):
+        yield
+
+
+@pytest.mark.usefixtures("few_pictures")
 def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys):
     """The call and the command find, write and print the same, and continue each other's work."""
     monkeypatch.chdir(tmp_path)
@@ -61,7 +69,7 @@ def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys
     said, seen = [], []
     found = cdpr.compute_workspace(
         "acrobot_large", "wrench-feasible", (3, 3, 3), required="push.yaml", box=BOX,
-        hull=[0, 0, 0.3], rays=300, certify=True, boxes=600, exit_error=1e-4, boxes_mesh="b.vtu",
+        hull=[0, 0, 0.3], rays=100, certify=True, boxes=300, exit_error=1e-4, boxes_mesh="b.vtu",
         folder="call", formats=("svg",), session=Session(seen.append, say=said.append),
     )  # fmt: skip
     told = as_json(found)
@@ -74,8 +82,8 @@ def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys
     assert "hull" in lines
     command = [
         "workspace", "acrobot_large", "--kind", "wrench-feasible", "--wrench-set", "push.yaml",
-        "--grid", "3,3,3", "--box=-0.5:0.5,-0.5:0.5,0:1", "--hull", "0,0,0.3", "--rays", "300",
-        "--certify", "--boxes", "600", "--exit-error", "1e-4", "--boxes-mesh", "c.vtu",
+        "--grid", "3,3,3", "--box=-0.5:0.5,-0.5:0.5,0:1", "--hull", "0,0,0.3", "--rays", "100",
+        "--certify", "--boxes", "300", "--exit-error", "1e-4", "--boxes-mesh", "c.vtu",
         "--format", "svg", "--workers", "1", "--json", "--out",
     ]  # fmt: skip
     for folder, words in (("call", "complete already"), ("command", "with pulleys of")):

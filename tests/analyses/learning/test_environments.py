@@ -1,6 +1,7 @@
-"""Gymnasium's own checks, and that seeds alone say what happens: alone, among many, elsewhere."""
+"""Environments: Gymnasium's own checks, seeds, doors; many do what each does alone."""
 
 import hashlib
+import json
 import subprocess
 import sys
 import warnings
@@ -12,30 +13,44 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+import cdpr_drake as cdpr
 import cdpr_drake.gym
-from cdpr_drake.analyses.learning.environments import RobotVectorEnv
+from cdpr_drake.analyses.benchmarks.learning import learning_rows
 from cdpr_drake.analyses.learning.task_table import TASKS, make_task
+from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.vision.apriltags import TagTarget
+from tests.analyses.benchmarks.once import without_repeats
+from tests.messages import printed
 
 NAMES = [f"cdpr/{name}-v0" for name in TASKS]
 DOUBT = {"*.exit_point.*": 1e-3, "all.stiffness": 1e4, "mass": 0.1}
 """Standard deviations [m, N, kg]."""
 
-ACTIONS = ("rates", "tensions", "twist")
-
 
 def test_every_task_is_registered_with_its_steps():
     assert {name: kind.steps for name, kind in TASKS.items()} == cdpr_drake.gym.STEPS
+    assert cdpr.environment_names() == NAMES
     for name in NAMES:
         assert gymnasium.spec(name).max_episode_steps == TASKS[name[5:-3]].steps
 
 
-@pytest.mark.parametrize("action", ACTIONS)
-@pytest.mark.parametrize("name", NAMES)
-def test_gymnasium_finds_nothing_wrong(name, action):
-    env = gymnasium.make(name, action=action, randomise=DOUBT)
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        ("Reach", {"action": "rates"}),
+        ("Track", {"action": "tensions"}),
+        ("VisualServo", {"action": "twist"}),
+        ("VisualServo", {"observation": "image"}),
+        ("PickAndPlace", {"action": "rates"}),
+        ("PickAndPlace", {"action": "tensions"}),
+        ("PickAndPlace", {"action": "twist"}),
+    ],
+)
+def test_gymnasium_finds_nothing_wrong(name, how):
+    """With each task, with each action, and with each action beside that of a gripper."""
+    env = gymnasium.make(f"cdpr/{name}-v0", **({"randomise": DOUBT} | how))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
@@ -73,8 +88,8 @@ def same(one, other):
             assert mine.tobytes() == its.tobytes()
 
 
-def test_256_robots_do_what_256_do_alone():
-    count = 256
+def test_40_robots_do_what_40_do_alone():
+    count = 40
     many = gymnasium.make_vec("cdpr/Reach-v0", count, randomise=DOUBT)
     random = np.random.default_rng(0)
     actions = random.uniform(-1, 1, (3, *many.action_space.shape)).astype(np.float32)
@@ -129,9 +144,18 @@ def test_other_seeds_are_other_episodes():
     assert first.tobytes() == again.tobytes() != second.tobytes()
 
 
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("robot", robot_names())
-def test_any_robot_takes_part(name, robot):
+KINDS = ("acrobot_small", "fast", "grab_three", "planar", "planar_point", "spider_camera")
+"""Robots of all motion types, with cables enough and with few."""
+
+TAKE_PART = sorted(
+    {(robot, NAMES[k % len(NAMES)]) for k, robot in enumerate(robot_names())}
+    | {(robot, name) for robot in KINDS for name in NAMES}
+)
+"""Every robot with one of the tasks, and one of each kind with all of them."""
+
+
+@pytest.mark.parametrize(("robot", "name"), TAKE_PART)
+def test_any_robot_takes_part(robot, name):
     """Whatever its motion type; also with few cables, whose start is a pose of rest."""
     envs = gymnasium.make_vec(name, 2, robot=robot)
     seen, _ = envs.reset(seed=0)
@@ -144,22 +168,24 @@ def test_any_robot_takes_part(name, robot):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    ("name", "options", "words"),
     [
-        ({"robot": "arm_on_platform"}, "arm_on_platform"),
-        ({"action": "torques"}, "action: found 'torques'"),
-        ({"speed": 1.0}, "found option 'speed'; accepted: robot, action"),
-        ({"randomise": {"weight": 1.0}}, "randomise: found 'weight'"),
-        ({"randomise": {"mass": -1.0}}, "randomise: mass: found -1.0"),
-        ({"period": 0.0}, "period: found 0.0"),
-        ({"turn_deg": 200.0}, "turn_deg: found 200.0"),
-        ({"winches": "motor", "action": "tensions"}, "winches: found motor"),
-        ({"render_mode": "human"}, "render_mode: found 'human'; accepted: null, rgb_array"),
+        ("Reech", {}, "Reach"),
+        ("Reach", {"count": 0}, "count: found 0; accepted: 1 or more"),
+        ("Reach", {"robot": "arm_on_platform"}, "arm_on_platform"),
+        ("Reach", {"action": "torques"}, "action: found 'torques'"),
+        ("Reach", {"speed": 1.0}, "found option 'speed'; accepted: robot, action"),
+        ("Reach", {"randomise": {"weight": 1.0}}, "randomise: found 'weight'"),
+        ("Reach", {"randomise": {"mass": -1.0}}, "randomise: mass: found -1.0"),
+        ("Reach", {"period": 0.0}, "period: found 0.0"),
+        ("Reach", {"turn_deg": 200.0}, "turn_deg: found 200.0"),
+        ("Reach", {"winches": "motor", "action": "tensions"}, "winches: found motor"),
+        ("Reach", {"render_mode": "human"}, "found 'human'; accepted: null, rgb_array"),
     ],
 )
-def test_what_is_not_accepted_is_said_in_one_line(options, words):
+def test_what_is_not_accepted_is_said_in_one_line(name, options, words):
     with pytest.raises(CdprError) as problem:
-        RobotVectorEnv("Reach", 2, **options)
+        cdpr.make_environment(name, **({"count": 2} | options))
     assert words in str(problem.value)
     assert "\n" not in str(problem.value)
 
@@ -183,7 +209,64 @@ def test_images_show_the_tag_where_the_features_are():
         camera, xy = task._picture.pinhole, task._own()[row, :8].reshape(2, 4)
         expected = camera.project(np.vstack([xy, np.ones(4)])).T.ravel()
         assert found == pytest.approx(expected, abs=1.0)
-    env = gymnasium.make("cdpr/VisualServo-v0", observation="image")
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        check_env(env.unwrapped)
+
+
+def run(capsys, *words):
+    try:
+        main(["environments", *words])
+        code = 0
+    except SystemExit as ended:
+        code = ended.code or 0
+    return code, printed(capsys)
+
+
+def test_one_and_many_by_short_and_long_name():
+    env = cdpr.make_environment("Reach", action="twist")
+    envs = cdpr.make_environment("cdpr/Reach-v0", 3, action="twist")
+    one, many = env.reset(seed=5)[0], envs.reset(seed=5)[0]
+    assert many.shape == (3, *one.shape)
+    np.testing.assert_array_equal(many[0], one)
+
+
+def test_without_gymnasium_it_says_what_to_install(monkeypatch):
+    monkeypatch.delitem(sys.modules, "cdpr_drake.gym", raising=False)
+    monkeypatch.setitem(sys.modules, "gymnasium.envs.registration", None)
+    with pytest.raises(CdprError, match="pip install"):
+        cdpr.environment_names()
+
+
+def test_the_command_lists_them_and_draws_one(capsys, tmp_path):
+    code, (out, _) = run(capsys, "--json", "--robot", "planar")
+    found = json.loads(out)
+    assert (code, [one["name"] for one in found]) == (0, cdpr.environment_names())
+    assert {one["robot"] for one in found} == {"planar"}
+    picture = tmp_path / "reach.png"
+    code, (out, _) = run(capsys, "Reach", "--picture", str(picture))
+    assert code == 0
+    assert "cdpr/Reach-v0" in out
+    assert picture.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("Reech",), "Reach"),
+        (("--picture", "all.png"), "accepted: a .png of one"),
+        (("Reach", "--picture", "reach.txt"), "accepted: a .png of one"),
+        (("Reach", "--action", "pull"), "action: found 'pull'"),
+        (("Reach", "--picture", "none/reach.png"), "none/reach.png: cannot be written"),
+    ],
+)
+def test_bad_input_is_told_in_one_line(capsys, tmp_path, monkeypatch, words, told):
+    monkeypatch.chdir(tmp_path)
+    code, (out, err) = run(capsys, *words)
+    assert (code, out) == (2, "")
+    assert told in err
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_benchmarks_compare_every_task(monkeypatch):
+    without_repeats(monkeypatch)
+    rows = learning_rows(quick=True)
+    assert [row.as_dict()["name"].split(",")[0] for row in rows] == cdpr.environment_names()

@@ -73,7 +73,7 @@ def test_velocity_and_acceleration_of_a_reference_are_its_slopes():
 
 @pytest.mark.parametrize("robot", ["acrobot_small", "caroca", "planar"])
 def test_the_tag_is_seen_from_where_episodes_begin(robot):
-    task = begun("VisualServo", count=30, robot=robot)
+    task = begun("VisualServo", count=12, robot=robot)
     assert task.infos()["found"].all()
 
 

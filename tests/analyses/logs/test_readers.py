@@ -11,6 +11,7 @@ from cdpr_drake.analyses.logs.log_formats import LOG_READERS, detect_log, read_r
 from cdpr_drake.analyses.logs.log_request import LogRequest, axes_rotation, read_mapping
 from cdpr_drake.errors import CdprError, LogFileError
 from tests.analyses.logs import recorders
+from tests.figure_faults import figure_faults
 
 DIGITS = 5.1e-5
 """Controllers write lengths with four digits behind the point [m]."""
@@ -39,33 +40,24 @@ def write(tmp_path):
     return written
 
 
-@pytest.mark.parametrize("format", FILES)
-def test_a_file_is_told_by_what_is_in_it(format, write):
-    name, make = FILES[format]
-    found = detect_log(write(name, make()))
-    assert found is not None
-    assert found.format == format
-    assert found.why
-
-
 def test_every_reader_has_a_file_here():
     assert {*FILES, "mat", "mcap"} == set(LOG_READERS)
 
 
 @pytest.mark.parametrize("format", FILES)
-def test_a_written_log_is_read_by_calibrations(format, write, tmp_path):
+def test_a_file_is_told_by_what_is_in_it_and_read_by_calibrations(format, write, tmp_path):
     name, make = FILES[format]
-    log = read_recorded(write(name, make()), asked=TOLD)
+    path = write(name, make())
+    found = detect_log(path)
+    assert (found.format, bool(found.why)) == (format, True)
+    log = read_recorded(path, asked=TOLD)
     log.write(tmp_path / "out.csv")
     again = read_recorded(tmp_path / "out.csv")
     assert list(again.columns) == list(log.columns)
     for header, values in log.columns.items():
         np.testing.assert_allclose(again.columns[header], values, rtol=1e-11)
-    if format in ("grab", "hangprinter"):
-        names = log.cables()
-        if format == "hangprinter":  # which has positions without turns
-            return
-        read = read_log(tmp_path / "out.csv", names)
+    if format == "grab":
+        read = read_log(tmp_path / "out.csv", log.cables())
         np.testing.assert_allclose(read.lengths[:, 2], log.columns["C3_length_m"], rtol=1e-11)
         np.testing.assert_allclose(read.tensions[:, 1], log.columns["C2_tension_n"], rtol=1e-11)
 
@@ -124,10 +116,8 @@ def test_series_of_a_hangprinter(write):
     np.testing.assert_allclose(log.columns["x_m"][:2], 1e-3 * recorders.POINTS[:, 0])
     assert np.isnan(log.columns["x_m"][2])
     assert "raw_force_A" in log.columns
-    told = read_recorded(
-        write("simulation.py", recorders.hangprinter_script()),
-        asked=LogRequest(units={"force": "n"}),
-    )
+    path = write("simulation.py", recorders.hangprinter_script())
+    told = read_recorded(path, asked=LogRequest(units={"force": "n"}))
     assert told.columns["A_tension_n"][0] == 13.7
 
 
@@ -193,10 +183,8 @@ def test_parsed_logs_of_grab(tmp_path):
 REFUSED = [
     ("take.csv", recorders.motive(), LogRequest(), "Length Units: found none"),
     ("take.csv", recorders.motive(units="Feet"), LogRequest(), "Length Units: found Feet"),
-    (
-        "take.csv", recorders.motive(bodies=("One", "Two")), TOLD,
-        "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them by --body",
-    ),
+    ("take.csv", recorders.motive(bodies=("One", "Two")), TOLD,
+     "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them by --body"),
     ("take.csv", recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
     ("log.txt", recorders.gtgraffiti(), LogRequest(), "time: found no column of times; accep"),
     ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
@@ -313,3 +301,36 @@ def test_numbers_that_have_no_square_are_refused(number, write):
     assert number in text
     with pytest.raises(LogFileError, match=r"log.csv:2: column 3: found .*accepted: a number up"):
         import_log(write("log.csv", text))
+
+
+# Figures.
+
+
+def drawn(write, header, row):
+    """The figure of a log of a few rows, and its axes by their labels."""
+    rows = [",".join(str(value * (k + 1)) for value in row) for k in range(5)]
+    figure = import_log(write("recorded.csv", "\n".join([header, *rows]) + "\n")).plot()
+    assert figure_faults(figure) == []
+    return figure, {axes.get_ylabel(): axes for axes in figure.axes}
+
+
+def test_motor_angles_in_degrees_of_cables_with_any_names_are_drawn(write):
+    figure, panels = drawn(
+        write, "A_motor_deg,B_motor_deg,C1_motor_angle_rad,x_mm,y_mm,z_mm",
+        (90.0, 180.0, 2.0, 1.0, 2.0, 3.0),
+    )  # fmt: skip
+    assert list(panels) == ["motor angle [deg]", "motor angle [rad]", "position [m]"]
+    degrees = panels["motor angle [deg]"]
+    labels = degrees.get_legend().get_texts()
+    assert [text.get_text() for text in labels] == ["A_motor", "B_motor"]
+    assert np.allclose(degrees.lines[1].get_ydata(), 180.0 * np.arange(1, 6))
+    assert "not drawn" not in figure.get_suptitle()
+
+
+def test_columns_that_are_not_drawn_are_said(write):
+    header = "time_s,C1_length_m,supply_voltage," + ",".join(f"aux{k}" for k in range(9))
+    figure, panels = drawn(write, header, range(1, 13))
+    assert list(panels) == ["cable length [m]"]
+    title = " ".join(figure.get_suptitle().split())
+    assert title.endswith("not drawn: supply_voltage, aux0, aux1, aux2, aux3, aux4, aux5, aux6 "
+                          "and 2 more")  # fmt: skip

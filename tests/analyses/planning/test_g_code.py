@@ -8,9 +8,8 @@ import pytest
 from cdpr_drake.analyses.front.planning import plan_path
 from cdpr_drake.analyses.planning.g_code import parse_g_code
 from cdpr_drake.analyses.planning.path_files import read_path
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import DataFileError
-from tests.messages import printed
+from tests.analyses.planning.plan_command import WRITES, run, undrawn
 
 ROUNDING = 1e-9  # of metres that are written with 9 digits behind the point in millimetres
 HEAD = "G21 G90 G17\nG0 X0 Y0 Z300\n"
@@ -209,36 +208,31 @@ G3 X-100 Y-50 R50
 def test_feeds_are_speeds_of_their_pieces(tmp_path, corners):
     file = tmp_path / "slot.nc"
     file.write_text(SLOT)
-    run = plan_path("acrobot_large", file, {"tensions": (1.0, 60.0)}, corners=corners, stations=300)
-    samples, path = run.samples, run.plan.path
+    fed, free = (
+        plan_path("acrobot_large", file, {"tensions": (1.0, 60.0), **more}, corners=corners,
+                  stations=300) for more in ({}, {"feeds": False})
+    )  # fmt: skip
+    samples, path = fed.samples, fed.plan.path
     way = np.linalg.norm(path.points(samples.parameters)[:, 10:13], axis=1) * samples.speeds
     most = path.largest_speeds(samples.parameters)
     assert set(np.unique(most)) == {0.1, 0.05, 0.2}
     assert np.max(way / most) < 1.0 + 2e-3
     assert np.max(samples.uses[:, 3]) == pytest.approx(np.max(way / most))
     assert np.mean(samples.active()["speed of Po"]) > 0.5
-    free = plan_path(
-        "acrobot_large",
-        file,
-        {"tensions": (1.0, 60.0), "feeds": False},
-        corners=corners,
-        stations=300,
-    )
-    assert free.plan.duration < 0.8 * run.plan.duration
+    assert free.plan.duration < 0.8 * fed.plan.duration
     assert free.plan.path.speeds is None
     assert (len(path.rests) == 3) == (corners == "rest")
 
 
-def test_the_command_says_what_a_file_has(tmp_path, capsys):
+def test_the_command_says_what_a_file_has(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(WRITES, undrawn)
     file = tmp_path / "slot.ngc"
     file.write_text(SLOT + "M5\nM30\n")
-    with pytest.raises(SystemExit) as end:
-        main([
-            "plan", "acrobot_large", "--path", str(file), "--limits", "1,60", "--corners", "blend",
-            "--stations", "100", "--no-track", "--json", "--out", str(tmp_path / "out"),
-        ])  # fmt: skip
-    out, err = printed(capsys)
-    assert end.value.code == 0
+    code, out, err = run(
+        capsys, "acrobot_large", "--path", str(file), "--limits", "1,60", "--corners", "blend",
+        "--stations", "100", "--no-track", "--json", "--out", str(tmp_path / "out"),
+    )  # fmt: skip
+    assert code == 0
     told = json.loads(out)["arguments"]
     assert (told["arcs"], told["feeds"]) == (2, True)
     assert told["feed_range_m_s"] == pytest.approx([0.05, 0.2])

@@ -18,7 +18,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 from cdpr_drake.errors import CdprError, DataFileError, PlanningError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.path_timing import plan_along_path
-from tests.analyses.planning.plan_command import run
+from tests.analyses.planning.plan_command import drawn, planned, run
 
 G_CODE = """%
 (a square) G21 G90
@@ -73,8 +73,9 @@ def test_g_code(tmp_path):
     ],
 )
 def test_wrong_files_are_named_with_their_line(tmp_path, name, words, said):
-    with pytest.raises(DataFileError, match=said):
+    with pytest.raises(DataFileError, match=said) as caught:
         read_path(write(tmp_path / name, words))
+    assert isinstance(caught.value, CdprError)
 
 
 def test_what_is_no_text_is_refused(tmp_path):
@@ -134,25 +135,16 @@ def test_the_command_plans_and_writes(tmp_path, capsys):
     table = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
     assert table["time_s"][-1] == pytest.approx(told["duration_s"], abs=1e-3)
     assert np.max(table["tension_C1_n"]) <= 60.0
-    for figure in ("phase_plane", "tensions", "winches", "path"):
-        assert (folder / f"{figure}.png").stat().st_size > 10_000
+    assert drawn(folder, "phase_plane", "tensions", "winches", "path")
 
 
 def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
     wrenches = write(tmp_path / "push.yaml", "box: [0, 0, 0.2, 10, 6, 0]\n")
-    words = (
-        "planar",
-        "--waypoints",
-        "-0.1,0.1,0.3; 0.2,0.1,0.3",
-        "--stations",
-        "100",
-        "--no-track",
-    )
-    code, out, _ = run(
-        capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "out"), "--json"
-    )
-    assert code == 0
-    told = json.loads(out)
+    words = ["planar", "--waypoints", "-0.1,0.1,0.3;0.2,0.1,0.3", "--stations", "100", "--no-track"]
+    folder = tmp_path / "out"
+    _, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(folder))
+    assert "resists 8 wrenches" in out
+    told = json.loads((folder / "summary.json").read_text())
     resisted = told["resist"]
     assert len(resisted["corners"]) == 8
     assert resisted["worst"]["least_margin"] == pytest.approx(
@@ -162,60 +154,78 @@ def test_the_command_plans_a_motion_that_resists(tmp_path, capsys):
     assert "deg" in resisted["worst"]["pose"]
     assert resisted["largest_share_between_stations"] < 1.002
     assert told["arguments"]["resist"] == str(wrenches)
-    assert (tmp_path / "out" / "resistance.png").stat().st_size > 10_000
-    code, out, _ = run(capsys, *words, "--resist", str(wrenches), "--out", str(tmp_path / "two"))
-    assert "resists 8 wrenches" in out
-    _, out, _ = run(capsys, *words, "--json", "--out", str(tmp_path / "without"))
-    assert "resist" not in json.loads(out)
+    assert drawn(folder, "resistance")
+    without = planned(tmp_path / "without", *words)
+    assert "resist" not in without
     assert not (tmp_path / "without" / "resistance.png").exists()
-    assert json.loads(out)["duration_s"] < told["duration_s"]
+    assert without["duration_s"] < told["duration_s"]
     round_set = write(tmp_path / "round.yaml", "ellipsoid: [0, 0, 0, 1, 1, 0]\n")
     code, _, err = run(capsys, *words, "--resist", str(round_set))
     assert code == 2
     assert f"{round_set}: ellipsoid: found one" in err.replace("\n", "")
-    code, _, err = run(
-        capsys,
-        "planar",
-        "--free",
-        "--from",
-        "0,0,.3",
-        "--to",
-        "0.1,0,.3",
-        "--resist",
-        str(round_set),
-    )
+    free = ("planar", "--free", "--from=0,0,.3", "--to=0.1,0,.3")
+    code, _, err = run(capsys, *free, "--resist", str(round_set))
     assert (code, "--resist: found with --free" in err) == (2, True)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["planar"], "--path, --waypoints: found neither"),
-        (["planar", "--waypoints", "0,0,0.3"], "found 1 poses"),
-        (["planar", "--waypoints", "0,0,0.3;0,x,0.3"], "--waypoints: found '0,x,0.3'"),
-        (
-            ["planar", "--waypoints", "0,0,0.3;0.1,0,0.35"],
-            "path: 2 of 2 poses: pose: found .* cannot have",
-        ),
-        (["planar", "--waypoints", "0,0,0.3;9,0,0.3"], "outside the frame"),
-        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--reserve", "0.6"], "reserve: found 0.6"),
-        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--tolerance", "0"], "tolerance: found 0"),
-        (["planar", "--waypoints", "0,0,0.3;0.1,0,0.3", "--speed", "-1"], "speed: found -1"),
-        (["planar", "--waypoints", "0,0,0.3;0,0,0.3"], "poses 1 and 2 are the same"),
-        (
-            ["acrobot_large", "--waypoints", "0,0,.2;.4,.4,1", "--limits", "5,20"],
-            r"at s = .*pose .*C\d",
-        ),
-    ],
-)
-def test_bad_input_is_named_and_writes_nothing(tmp_path, monkeypatch, capsys, words, said):
+NEAR = "--waypoints 0,0,0.3;0.1,0,0.3"
+FROM, TO = "--from=-0.15,0,0.3", "--to=0.15,0,0.3"
+PROVEN, LOW = "acrobot_small --proven", "--from=-0.15,0,0.25 --to=0.15,0,0.25"
+
+REFUSALS = [
+    ("planar", "--path, --waypoints: found neither"),
+    ("planar --waypoints 0,0,0.3", "found 1 poses"),
+    ("planar --waypoints 0,0,0.3;0,x,0.3", "--waypoints: found '0,x,0.3'"),
+    ("planar --waypoints 0,0,0.3;0.1,0,0.35", "path: 2 of 2 poses: pose: found .* cannot have"),
+    ("planar --waypoints 0,0,0.3;9,0,0.3", "outside the frame"),
+    (f"planar {NEAR} --reserve 0.6", "reserve: found 0.6"),
+    (f"planar {NEAR} --tolerance 0", "tolerance: found 0"),
+    (f"planar {NEAR} --speed -1", "speed: found -1"),
+    ("planar --waypoints 0,0,0.3;0,0,0.3", "poses 1 and 2 are the same"),
+    ("acrobot_large --waypoints 0,0,.2;.4,.4,1 --limits 5,20", r"at s = .*pose .*C\d"),
+    # Free motions.
+    (f"planar --free {FROM} {TO} --waypoints 0,0,1;0,0,2", "--free: found --path or --waypoints"),
+    (f"planar --free {FROM}", "--to: found none with --free"),
+    (f"planar --free --from=0,0 {TO}", "--from: found '0,0'"),
+    (f"planar {FROM} {TO} {NEAR}", "--from: accepted with --free"),
+    (f"planar --free {FROM} {TO} --least work", "least: found 'work'; accepted: time, tension"),
+    (f"planar --free {FROM} {TO} --least tension", "duration: found none with the least tension"),
+    (f"planar --free {FROM} {TO} --duration 1", "duration: found one with the least time"),
+    (f"planar --free {FROM} {TO} --clearance -1", "clearance: found -1"),
+    (f"planar --free {FROM} {TO} --knots 2", "knots: found 2"),
+    (f"planar --free {FROM} {TO} --camera x", "--keep-in-view: found none with --camera"),
+    (f"planar --free {FROM} {TO} --keep-in-view 0,0", "--keep-in-view: found '0,0'"),
+    (f"planar --free {FROM} --to=-0.15,0,0.3", "to: found the pose of the start"),
+    (f"planar --free {FROM} --to=0.2,0.1,0.4", "to: pose: found .* cannot have"),
+    (f"planar --free {FROM} {TO} --obstacles no.yaml", "no.yaml: there is no such file"),
+    (f"planar --free {FROM} {TO} --limits 50,60", r"from: pose .* C\d .* accepted: 5"),
+    (f"planar --free {FROM} {TO} --method gcs", "--method: accepted with --proven; found no --pr"),
+    (f"planar --free {FROM} {TO} --guess none.csv", "none.csv: there is no such file of a motion"),
+    # Proven motions.
+    (f"{PROVEN} --from=-0.15,0,0.25", "--to: found none with --proven"),
+    (f"{PROVEN} {LOW} --free", "--proven: found --free too"),
+    (f"{PROVEN} {LOW} --knots 5", "--proven: found --knots too"),
+    (f"{PROVEN} {LOW} --waypoints 0,0,1;0,0,2", "--proven: found --waypoints too"),
+    ("acrobot_small --time --waypoints 0,0,1;0,0,2", "--time: accepted with --proven"),
+    (f"{PROVEN} {LOW} --acceleration -1", "--acceleration: found '-1'"),
+    (f"{PROVEN} {LOW} --acceleration 1,2,3,4", "--acceleration: found '1,2,3,4'"),
+    (f"{PROVEN} {LOW} --boxes 0", "--boxes: found 0"),
+    (f"{PROVEN} {LOW} --obstacles none.yaml", "none.yaml: there is no such file"),
+    (f"{PROVEN} --from=-0.15,0,0.25 --to=0.5,0,0.2 --boxes 500",
+     "to: found the pose 0.5,0,0.2,0,0,0: wrench-feasible fails: capac"),
+    (f"{PROVEN} --from=0.5,0,0.2 --to=0.15,0,0.25 --boxes 500", "from: found the pose 0.5"),
+    (f"{PROVEN} {LOW} --method best", "--method: found 'best'; accepted: sequ"),
+    (f"{PROVEN} {LOW} --guess a.csv", "--proven: found --guess too"),
+    (f"{PROVEN} --from=-0.15,0,0.25 --to=0.15,0,0.25,0,0,9 --acceleration 1",
+     "accelerations: found with a range of angles"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("words", "said"), REFUSALS)
+def test_bad_input_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
-    code, _, err = run(capsys, *words)
+    code, _, err = run(capsys, *words.split())
     assert code == 2
     assert re.search(said, err), err
     assert len(err.strip().splitlines()) == 1
-    assert not list(tmp_path.rglob("*.csv"))
-
-
-def test_errors_are_of_the_family():
-    assert issubclass(DataFileError, CdprError)
+    assert not list(tmp_path.iterdir())

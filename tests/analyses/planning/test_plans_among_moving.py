@@ -19,20 +19,11 @@ from cdpr_drake.workspaces.moving_clearances import moving_clearances
 ROBOT = "acrobot_large"
 START, GOAL = (pose_from_angles(np.array([x, 0.1, 0.25]), np.zeros(3)) for x in (-0.3, 0.3))
 AWAY, THERE = [0.0, -0.5, 0.2], [0.0, 0.0, 0.2]
-PASSING = {
-    "boxes": [
-        {
-            "pose": {"position": AWAY},
-            "size": [0.1, 0.1, 0.4],
-            "motion": {
-                "waypoints": [
-                    {"time": time, "pose": {"position": place}}
-                    for time, place in ((1.5, THERE), (5.0, THERE), (7.5, AWAY))
-                ]
-            },
-        }
-    ]
-}
+PLACES = ((1.5, THERE), (5.0, THERE), (7.5, AWAY))
+WAY = [{"time": time, "pose": {"position": place}} for time, place in PLACES]
+PASSING = {"boxes": [
+    {"pose": {"position": AWAY}, "size": [0.1, 0.1, 0.4], "motion": {"waypoints": WAY}}
+]}  # fmt: skip
 """A box that stands in the way from 1 s to 6 s, about."""
 
 
@@ -95,20 +86,14 @@ def test_a_plan_writes_table_sets_figures_and_replay(run, tmp_path):
 @pytest.mark.parametrize(
     ("motion", "words"),
     [
-        (
-            {"waypoints": [{"time": t, "pose": {"position": AWAY}} for t in (1.0, 0.5)]},
-            r"boxes\[0\].motion.waypoints: .*growing",
-        ),
-        (
-            {"velocity": [1, 0, 0], "joint": {"point": AWAY, "axis": [0, 0, 1]}},
-            r"boxes\[0\].motion: .*one of them",
-        ),
-        ({"speed": 1.0}, "speed"),
+        ({"waypoints": WAY[::-1]}, "motion.waypoints: .*growing"),
+        ({"velocity": [1, 0, 0], "joint": {"point": AWAY, "axis": [0, 0, 1]}}, "motion: .*one of"),
+        ({"speed": 1.0}, "motion.*speed"),
     ],
 )
 def test_a_motion_that_is_not_accepted_is_named(tmp_path, motion, words):
     box = {"pose": {"position": AWAY}, "size": [0.1, 0.1, 0.1], "motion": motion}
-    with pytest.raises(DataFileError, match=words):
+    with pytest.raises(DataFileError, match=rf"boxes\[0\].{words}"):
         load_all_obstacles(write(tmp_path, {"boxes": [box]}))
 
 
@@ -140,23 +125,26 @@ def test_all_shapes_and_other_robots_move(tmp_path):
     assert len(moving[3].at(0.0)) == 9
 
 
-def test_a_robot_without_its_plan_is_named(tmp_path):
-    path = write(
-        tmp_path, {"robots": [{"robot": ROBOT, "pose": {"position": AWAY}, "plan": "nowhere"}]}
-    )
-    with pytest.raises(DataFileError, match=r"robots\[0\].plan: .*no such file"):
-        load_all_obstacles(path)
-    path = write(tmp_path, {"robots": [{"robot": "nobody", "pose": {"position": AWAY}}]})
-    with pytest.raises(DataFileError, match=r"robots\[0\].robot: .*nobody"):
+@pytest.mark.parametrize(
+    ("robot", "words"),
+    [
+        ({"robot": ROBOT, "plan": "nowhere"}, r"robots\[0\].plan: .*no such file"),
+        ({"robot": "nobody"}, r"robots\[0\].robot: .*nobody"),
+    ],
+)
+def test_a_robot_or_its_plan_that_is_not_there_is_named(tmp_path, robot, words):
+    path = write(tmp_path, {"robots": [{"pose": {"position": AWAY}, **robot}]})
+    with pytest.raises(DataFileError, match=words):
         load_all_obstacles(path)
 
 
 def test_what_is_not_planned_among_what_moves_is_refused(tmp_path, sets):
     path = write(tmp_path, PASSING)
     turned = pose_from_angles(GOAL.translation(), np.array([0.0, 0.0, 0.1]))
-    with pytest.raises(PlanningError, match="found two orientations"):
-        plan_proven_motion(ROBOT, START, turned, obstacles=path)
-    with pytest.raises(PlanningError, match="method: found 'gcs'"):
-        plan_proven_motion(ROBOT, START, GOAL, obstacles=path, method="gcs")
-    with pytest.raises(PlanningError, match="accelerations: found 0"):
-        plan_proven_motion(ROBOT, START, GOAL, obstacles=path, accelerations=0.0)
+    for goal, more, words in (
+        (turned, {}, "found two orientations"),
+        (GOAL, {"method": "gcs"}, "method: found 'gcs'"),
+        (GOAL, {"accelerations": 0.0}, "accelerations: found 0"),
+    ):
+        with pytest.raises(PlanningError, match=words):
+            plan_proven_motion(ROBOT, START, goal, obstacles=path, **more)

@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import PlanningError, RobotFileError
-from tests.messages import printed
+from tests.analyses.planning.plan_command import WRITES, undrawn
+from tests.analyses.planning.plan_command import run as run_plan
 
 NEWTON = 1e-9
 """Share of the largest tension: sums of a few forces in doubles."""
@@ -38,13 +39,16 @@ CASES = {
 }
 
 
+def poses(places):
+    return [RigidTransform(p) for p in places]
+
+
 @pytest.fixture(scope="module", params=CASES)
 def case(request):
     """A plan, and the axes of W along which its platform moves."""
     robot, places, axes = CASES[request.param]
     robot = cdpr.load_robot(robot) if isinstance(robot, str) else robot()
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
-    return cdpr.plan_path(robot, poses), list(axes)
+    return cdpr.plan_path(robot, poses(places)), list(axes)
 
 
 def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
@@ -74,41 +78,27 @@ def test_tensions_of_a_plan_move_the_mass_as_newton_says(case):
     assert largest <= limits[1]
 
 
-def test_a_fine_stream_keeps_cables_taut_and_a_coarse_one_does_not():
-    robot, places, _ = CASES["a wall"]
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
-    run = cdpr.plan_path(robot, poses, {"cable_speed": 1.0, "cable_acceleration": 4.0})
-    fine, coarse = cable_stream(run, 2000.0), cable_stream(run, 10.0)
-    assert fine.check.keeps_taut
-    assert not coarse.check.keeps_taut
-    radius = run.robot.winch.drum_radius + run.robot.cable.diameter / 2.0
-    np.testing.assert_allclose(
-        fine.motor_angles * radius, fine.lengths - fine.zero_lengths, rtol=0.02, atol=1e-9
-    )
-
-
 def test_blocks_and_tackles_turn_the_motor_further():
     robot, places, _ = CASES["a board"]
     robot = cdpr.load_robot(robot)
     tackled = replace(
         robot, cables=[replace(cable, mechanical_advantage=2.0) for cable in robot.cables]
     )
-    poses = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in places]
     asked = {"cable_speed": 0.05}
-    plain, twice = (cable_stream(cdpr.plan_path(one, poses, asked), 20.0)
-                    for one in (robot, tackled))  # fmt: skip
+    plain, twice = (
+        cable_stream(cdpr.plan_path(one, poses(places), asked), 20.0) for one in (robot, tackled)
+    )
     np.testing.assert_allclose(twice.motor_angles, 2.0 * plain.motor_angles, rtol=1e-12)
 
 
-def test_the_command_streams_g_code_of_a_router(tmp_path, capsys):
+def test_the_command_streams_g_code_of_a_router(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(WRITES, undrawn)
     (tmp_path / "a.gcode").write_text(G_CODE)
     out = tmp_path / "out"
-    args = ["plan", "maslow_4", "--path", str(tmp_path / "a.gcode"), "--stream", "20"]
-    with pytest.raises(SystemExit) as ended:
-        main([*args, "--stations", "150", "--out", str(out)])
-    assert ended.value.code == 0
-    said = printed(capsys)
-    assert "not tracked: computed torque moves bodies alone" in said.err
+    args = ["maslow_4", "--path", str(tmp_path / "a.gcode"), "--stream", "20"]
+    code, _, err = run_plan(capsys, *args, "--stations", "150", "--out", str(out))
+    assert code == 0
+    assert "not tracked: computed torque moves bodies alone" in err
     stream = json.loads((out / "stream.json").read_text())
     assert stream["keeps_taut"]
     rows = np.genfromtxt(out / "lengths.csv", delimiter=",", names=True)

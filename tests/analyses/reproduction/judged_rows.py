@@ -1,7 +1,5 @@
 """Rows of a report about statements that were judged as a test says."""
 
-from __future__ import annotations
-
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reproduction.rows import report_rows
 from cdpr_drake.analyses.reproduction.states import StudyState, study_folder

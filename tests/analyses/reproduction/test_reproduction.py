@@ -1,7 +1,5 @@
 """The machinery on tiny studies of the catalogue's type: resuming, failing, missing, the page."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import signal
@@ -44,42 +42,29 @@ NUMBER = PublishedNumber(
     factor=1e3, format=".1f", printed="2",
 )  # fmt: skip
 
-REGISTER = read_register(
-    "toy",
-    {
-        "title": "A toy thesis <1>",
-        "sections": [
-            {
-                "section": "1.1",
-                "title": "Heights & depths",
-                "statements": ["good/high", "good/deep", "bad/high", "late/high", "other/high"],
-                "numbers": ["good/one"],
-                "items": [
-                    {
-                        "label": "Figure 1.1",
-                        "says": "Seen",
-                        "figures": ["good/view"],
-                        "differs": "wider < taller",
-                    },
-                    {"label": "Figure 1.2", "says": "Unseen", "figures": ["good/nothing"]},
-                    {
-                        "label": "Table 1.1",
-                        "says": "Both",
-                        "answers": ["good/high", "good/low"],
-                        "figures": ["good/nothing"],
-                    },
-                    {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
-                    {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
-                    {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
-                    {"label": "statement", "says": "Others did", "cited": "not done here"},
-                ],
-            }
+REGISTER = read_register("toy", {
+    "title": "A toy thesis <1>",
+    "sections": [{
+        "section": "1.1",
+        "title": "Heights & depths",
+        "statements": ["good/high", "good/deep", "bad/high", "late/high", "other/high"],
+        "numbers": ["good/one"],
+        "items": [
+            {"label": "Figure 1.1", "says": "Seen", "figures": ["good/view"],
+             "differs": "wider < taller"},
+            {"label": "Figure 1.2", "says": "Unseen", "figures": ["good/nothing"]},
+            {"label": "Table 1.1", "says": "Both", "answers": ["good/high", "good/low"],
+             "figures": ["good/nothing"]},
+            {"label": "Table 1.3", "says": "One", "answers": ["good/low", "good/deep"]},
+            {"label": "Table 1.4", "says": "Other", "answers": ["good/high", "good/deep"]},
+            {"label": "Table 1.2", "says": "Nothing", "missing": "nobody ran it"},
+            {"label": "statement", "says": "Others did", "cited": "not done here"},
         ],
-        "own": ["good"],
-        "not_drawn": [{"label": "Figure 1.3", "says": "Unprinted", "why": "its poses are lost"}],
-        "no_result": ["Figure 1.4"],
-    },
-)
+    }],
+    "own": ["good"],
+    "not_drawn": [{"label": "Figure 1.3", "says": "Unprinted", "why": "its poses are lost"}],
+    "no_result": ["Figure 1.4"],
+})  # fmt: skip
 
 
 @dataclass
@@ -135,11 +120,28 @@ def folder(tmp_path):
     return tmp_path / "r"
 
 
-def entries(**studies):
+@pytest.fixture
+def quick_folder(tmp_path):
+    check_folder(tmp_path / "q", quick=True)
+    return tmp_path / "q"
+
+
+def entries(numbers=(NUMBER,), **studies):
     return {
-        name: StudyEntry(study, judges=study.names, numbers=(NUMBER,))
+        name: StudyEntry(study, judges=study.names, numbers=numbers)
         for name, study in studies.items()
     }
+
+
+def reported(folder, studies, register=REGISTER, quick=False):
+    """Rows of a reproduction of some studies, and its page."""
+    states = run_studies(studies, folder, RunSettings(quick=quick))
+    rows = report_rows([register], folder, studies, states)
+    return rows, write_report(folder, [register], rows, states, quick=quick).read_text()
+
+
+def page_of(folder, register, rows):
+    return write_report(folder, [register], rows, {}, quick=False).read_text()
 
 
 def test_what_is_finished_is_taken_over_and_a_failure_is_tried_again(folder):
@@ -254,11 +256,9 @@ def test_nothing_is_begun_once_it_shall_stop(folder):
 
 def test_rows_have_every_item_beside_what_was_found(folder):
     studies = entries(good=Toy(("high", "low")), bad=Toy(fails=True), late=Toy(interrupted=True))
-    states = run_studies(studies, folder, RunSettings())
-    rows = report_rows([REGISTER], folder, studies, states)
+    rows, _ = reported(folder, studies)
     found = {(row.label, row.words): row for row in rows}
-    verdicts = [row.verdict for row in rows]
-    assert verdicts == [
+    assert [row.verdict for row in rows] == [
         "confirmed", "missing", "study failed", "not finished", "not asked for", "shown", "missing",
         "in part", "not confirmed", "in part", "missing", "cited", "confirmed", "confirmed",
         "not confirmed",
@@ -266,10 +266,8 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     assert found["statement", "It is high."].found == "yes & no"
     assert found["Figure 1.1", "Seen"].figures == ("studies/good/view.png",)
     assert found["Table 1.1", "Both"].printed == "high: yes; low: yes"
-    assert (
-        found["Table 1.1", "Both"].found
-        == "high: confirmed, yes & no; low: not confirmed, yes & no"
-    )
+    both = "high: confirmed, yes & no; low: not confirmed, yes & no"
+    assert found["Table 1.1", "Both"].found == both
     assert found["Table 1.1", "Both"].why == "low: why; its figure was not drawn"
     assert found["Figure 1.1", "Seen"].differs == "wider < taller"
     assert found["Table 1.4", "Other"].why == "without a verdict here: deep."
@@ -281,40 +279,26 @@ def test_rows_have_every_item_beside_what_was_found(folder):
     assert sum(card.as_dict()["all"].values()) == len(rows)
 
 
-def test_in_the_quick_form_what_is_not_there_is_not_judged(tmp_path):
-    check_folder(tmp_path / "q", quick=True)
-    studies = entries(good=Toy(("high",)))
-    states = run_studies(studies, tmp_path / "q", RunSettings(quick=True))
-    rows = report_rows([REGISTER], tmp_path / "q", studies, states)
+def test_in_the_quick_form_what_is_not_there_is_not_judged(quick_folder):
+    rows, page = reported(quick_folder, entries(good=Toy(("high",))), quick=True)
     found = [row.verdict for row in rows if row.studies == ("good",)]
     assert found.count("not judged in the quick form") == 3  # deep, low, and an unseen figure
+    assert "quick form" in page
 
 
-def test_the_page_holds_its_figures_and_escapes_words(folder):
-    studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
-    states = run_studies(studies, folder, RunSettings())
-    rows = report_rows([REGISTER], folder, studies, states)
-    page = write_report(folder, [REGISTER], rows, states, quick=True).read_text()
+def test_the_page_holds_its_figures_escapes_words_and_links_files(folder):
+    _, page = reported(folder, entries(good=Toy(("high",)), bad=Toy(fails=True)))
     assert page.count("data:image/png;base64,") == 1
-    for words in ("A toy thesis &lt;1&gt;", "it &lt;broke&gt;", "yes &amp; no", "a &lt; b"):
+    for words in (
+        "A toy thesis &lt;1&gt;", "it &lt;broke&gt;", "yes &amp; no", "a &lt; b", "nobody ran it",
+        "Differs: wider &lt; taller.", "Figure 1.3: Unprinted. <em>its poses are lost</em>",
+        "not repeated: Figure 1.4.", 'id="figure-studies-good-view"',
+    ):  # fmt: skip
         assert words in page
     assert not any(f'{word}="http' in page for word in ("src", "href"))
-    assert "quick form" in page
-    assert "nobody ran it" in page
-    assert "Differs: wider &lt; taller." in page
-    assert "Figure 1.3: Unprinted. <em>its poses are lost</em>" in page
-    assert "not repeated: Figure 1.4." in page
-    assert 'href="#figure-studies-good-view"' in page
-    assert 'id="figure-studies-good-view"' in page
     assert [path.name for path in folder.glob(".*.part")] == []
-
-
-def test_raw_results_and_figures_are_linked_by_relative_paths(folder):
-    studies = entries(good=Toy(("high",)), bad=Toy(fails=True))
-    states = run_studies(studies, folder, RunSettings())
-    rows = report_rows([REGISTER], folder, studies, states)
-    page = write_report(folder, [REGISTER], rows, states, quick=False).read_text()
     links = [part.partition('"')[0] for part in page.split('href="')[1:]]
+    assert "#figure-studies-good-view" in links
     files = [link for link in links if not link.startswith("#")]
     assert set(files) >= {"studies/good/results.json", "studies/good/view.png"}
     assert all((folder / file).exists() for file in files)
@@ -327,17 +311,21 @@ def test_figures_that_are_asked_for_in_another_format_are_drawn_again(folder):
             for ending in formats:
                 (where / f"view.{ending}").touch()
 
-    formats = []
-
-    def study(quick, session):
-        session.folder.mkdir(exist_ok=True)
-        return Both([])
-
-    studies = {"good": StudyEntry(study)}
+    studies, formats = {"good": StudyEntry(giving([Both] * 4))}, []
     for asked in (("png",), ("png", "pdf"), ("png", "pdf"), ("png",)):
         state = run_studies(studies, folder, RunSettings(formats=asked))["good"]
         formats.append((state.taken_over, (folder / "studies/good/view.pdf").is_file()))
     assert formats == [(False, False), (False, True), (True, True), (True, True)]
+
+
+def giving(results):
+    """A study that gives results of these kinds, one after the other."""
+
+    def study(quick, session):
+        session.folder.mkdir(exist_ok=True)
+        return results.pop(0)([])
+
+    return study
 
 
 def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):
@@ -346,22 +334,11 @@ def test_a_study_whose_figures_could_not_be_written_is_not_taken_over(folder):
             super().write(where, formats)
             raise OSError(28, "No space left on device")
 
-    results = [Full, ToyResult]
-    sessions = []
-
-    def study(quick, session):
-        session.folder.mkdir(exist_ok=True)
-        sessions.append(session)
-        return results.pop(0)([])
-
-    studies = {"good": StudyEntry(study)}
+    studies = {"good": StudyEntry(giving([Full, ToyResult]))}
     first = run_studies(studies, folder, RunSettings())["good"]
-    assert (first.status, first.error) == (
-        "finished",
-        "figures: [Errno 28] No space left on device",
-    )
+    assert first.status == "finished"
+    assert first.error == "figures: [Errno 28] No space left on device"
     again = run_studies(studies, folder, RunSettings())["good"]
-    assert len(sessions) == 2
     assert (again.status, again.error, again.taken_over) == ("finished", "", False)
 
 
@@ -399,14 +376,13 @@ def test_a_fact_is_counted_once_however_many_items_rest_on_it(folder):
     assert rows[-1].verdict == "in part"
 
 
-def test_a_table_is_as_good_as_the_weakest_of_what_it_rests_on(folder):
-    _, rows = judged_rows(folder, one=[said("high", [True]), said("near", [True], FITTED)])
+def test_a_table_is_as_good_as_the_weakest_and_the_page_has_all_tolerances(folder):
+    register, rows = judged_rows(
+        folder,
+        one=[said("high", [True], rule="within 3 mm <half>"), said("near", [True], FITTED)],
+    )
     assert rows[-1].verdict == "met (fitted)"
-
-
-def test_the_page_has_all_tolerances_and_marks_what_was_counted(folder):
-    register, rows = judged_rows(folder, one=[said("high", [True], rule="within 3 mm <half>")])
-    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    page = page_of(folder, register, rows)
     assert "within 3 mm &lt;half&gt;" in page
     assert page.count("counted above") == 1
 
@@ -418,7 +394,7 @@ def test_a_chapter_says_what_stands_and_why_what_fails(folder):
         two=[said("low", [False], cause="hardware"), said("odd", [True, False])],
     )
     register = replace(register, corrected={"1": ("(1.2)",), "2": ("(2.1)",)})
-    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    page = page_of(folder, register, rows)
     start = page.index('<h2 id="chapters">')
     words = page[start : page.index("<h2", start + 1)]
     assert "<b>Stands, 1</b>: It is high." in words
@@ -433,7 +409,7 @@ def test_what_is_fitted_or_counted_above_is_marked_in_words(folder):
     register, rows = judged_rows(
         folder, one=[said("near", [False], FITTED), said("met", [True], FITTED)]
     )
-    page = write_report(folder, [register], rows, {}, quick=False).read_text()
+    page = page_of(folder, register, rows)
     lines = page[page.index('<table class="items">') :].split("<tr")[2:5]
     assert ['<span class="mark">fitted</span>' in line for line in lines] == [True, False, True]
     assert "met (fitted)" in lines[1]
@@ -441,12 +417,9 @@ def test_what_is_fitted_or_counted_above_is_marked_in_words(folder):
 
 
 def test_beside_a_figure_stand_the_printed_numbers_of_its_runs_and_ours(folder):
-    register = replace(REGISTER, sections=(replace(REGISTER.sections[0], numbers=("good/one",)),))
     several = tuple(replace(NUMBER, label=f"C{k}") for k in range(6))
     for numbers, more in (((NUMBER,), ""), (several, "; 2 more below")):
-        studies = {"good": replace(entries(good=Toy(("high", "low")))["good"], numbers=numbers)}
-        states = run_studies(studies, folder, RunSettings())
-        rows = report_rows([register], folder, studies, states)
+        rows, _ = reported(folder, entries(numbers, good=Toy(("high", "low"))))
         found = {row.label: row for row in rows}
         first = numbers[0].label
         assert found["Figure 1.1"].printed.startswith(f"{first}, length [mm]: 2")
@@ -461,18 +434,14 @@ def test_a_printed_number_that_is_not_confirmed_has_its_cause(folder):
     causes = {}
     for printed in ("2", "9"):
         number = replace(NUMBER, printed=printed, why="it slips", cause="hardware")
-        studies = {"good": replace(entries(good=Toy())["good"], numbers=(number,))}
-        states = run_studies(studies, folder, RunSettings())
-        rows = report_rows([REGISTER], folder, studies, states)
+        rows, _ = reported(folder, entries((number,), good=Toy()))
         (row,) = [row for row in rows if row.label == "number"]
         causes[row.verdict] = row.facts[0].cause
     assert causes == {"confirmed": "", "not confirmed": "hardware"}
 
 
 def test_what_was_not_asked_for_is_folded_and_counted(folder):
-    states = run_studies(entries(late=Toy(("high",))), folder, RunSettings())
-    rows = report_rows([REGISTER], folder, entries(late=Toy(("high",))), states)
-    page = write_report(folder, [REGISTER], rows, states, quick=False).read_text()
+    rows, page = reported(folder, entries(late=Toy(("high",))))
     count = sum(row.verdict == "not asked for" for row in rows)
     assert f"<summary>Not asked for: {count} items of 3 studies</summary>" in page
     assert "<b>other</b>, 1: statement" in page
@@ -481,19 +450,14 @@ def test_what_was_not_asked_for_is_folded_and_counted(folder):
     assert "Stands" in page  # what was asked for is told
 
 
-def test_what_the_quick_form_cannot_judge_is_folded_where_it_is_long(tmp_path):
-    check_folder(tmp_path / "q", quick=True)
-    names = [f"low{k}" for k in range(9)]
-    for count, folded in ((3, 0), (4, 1)):
-        answers = [f"good/{name}" for name in names[:count]]
-        register = read_register("toy", {"title": "Toy", "sections": [
-            {"section": "1.1", "title": "One", "statements": ["good/high", *answers]}
-        ]})  # fmt: skip
-        studies = entries(good=Toy(("high",)))
-        states = run_studies(studies, tmp_path / "q", RunSettings(quick=True))
-        rows = report_rows([register], tmp_path / "q", studies, states)
-        page = write_report(tmp_path / "q", [register], rows, states, quick=True).read_text()
-        assert page.count("items that are judged in the full form only</summary>") == folded
+@pytest.mark.parametrize(("count", "folded"), [(3, 0), (4, 1)])
+def test_what_the_quick_form_cannot_judge_is_folded_where_it_is_long(quick_folder, count, folded):
+    answers = [f"good/low{k}" for k in range(count)]
+    register = read_register("toy", {"title": "Toy", "sections": [
+        {"section": "1.1", "title": "One", "statements": ["good/high", *answers]}
+    ]})  # fmt: skip
+    _, page = reported(quick_folder, entries(good=Toy(("high",))), register, quick=True)
+    assert page.count("items that are judged in the full form only</summary>") == folded
 
 
 def test_chapters_count_each_fact_where_the_scorecard_does(folder):

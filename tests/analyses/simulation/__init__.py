@@ -1,3 +1,1 @@
 """Tests of `cdpr_drake.analyses.simulation`."""
-
-"""Tests of `cdpr_drake.analyses.simulation`."""

@@ -22,34 +22,33 @@ COMPILED = "integration.engine=compiled"
 PROJECTED = "camera.kind=projected"
 
 SAME_PATH = 1e-6
-"""Distance of paths over a second in which cables go slack and catch [m]; the engines take steps of
+"""Distance of paths in which cables go slack and catch [m]; the engines take steps of
 the same length, but not at the same times."""
 
 SAME_TENSIONS_PATH = 1e-12
 """The same without cables that stretch, where nothing is stiff."""
 
 
-def distance(one, other):
+def by_both(run, name, *overrides):
+    """A run by the plant, one by the compiled engine, and how far apart their paths are [m]."""
+    one, other = (
+        run(load_scenario(name, [*overrides, engine]))
+        for engine in ("integration.engine=plant", COMPILED)
+    )
     count = min(len(one.log["time"]), len(other.log["time"]))
-    return np.max(pose_rows_distance(one.log["X_WP"][:count], other.log["X_WP"][:count])[0])
+    apart, _ = pose_rows_distance(one.log["X_WP"][:count], other.log["X_WP"][:count])
+    return one, other, np.max(apart)
 
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [
-        ("acrobot_pbvs", ["duration=1.0"]),
-        ("acrobot_friction", ["winches.mode=position", "duration=1.0"]),
-        ("planar_pbvs", ["duration=1.0"]),
-    ],
+    [("acrobot_pbvs", ()), ("acrobot_friction", ("winches.mode=position",)), ("planar_pbvs", ())],
 )
 def test_a_servo_takes_the_same_path(name, overrides):
-    plant, compiled = (
-        run_scenario(load_scenario(name, [PROJECTED, *overrides, engine]))
-        for engine in ("integration.engine=plant", COMPILED)
-    )
+    plant, compiled, apart = by_both(run_scenario, name, PROJECTED, "duration=0.6", *overrides)
     assert plant.outcome == compiled.outcome == Outcome.TIMEOUT
     assert np.max(np.ptp(plant.log["X_WP"][:, 4:], axis=0)) > 0.01
-    assert distance(plant, compiled) < SAME_PATH
+    assert apart < SAME_PATH
     np.testing.assert_allclose(plant.log["time"], compiled.log["time"], atol=1e-9)
 
 
@@ -67,25 +66,22 @@ def test_the_summary_names_engine_and_errors_and_a_run_repeats_byte_for_byte():
 
 
 def test_a_rendered_camera_sees_the_platform_where_the_engine_has_it():
-    plant, compiled = (
-        run_scenario(load_scenario("acrobot_pbvs", ["camera.kind=rendered", "duration=0.5", *more]))
-        for more in ([], [COMPILED])
+    _, compiled, apart = by_both(
+        run_scenario, "acrobot_pbvs", "camera.kind=rendered", "duration=0.2"
     )
     assert compiled.log["found"][-1, 0] == 1.0
-    assert distance(plant, compiled) < SAME_PATH
+    assert apart < SAME_PATH
 
 
 def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
-    overrides = [PROJECTED, COMPILED, "duration=0.3"]
-    careful = run_scenario(load_scenario("acrobot_pbvs", [*overrides, "integration.accuracy=1e-8"]))
+    careful, stable = (
+        run_scenario(load_scenario("acrobot_pbvs", [PROJECTED, COMPILED, "duration=0.3", *more]))
+        for more in (["integration.accuracy=1e-8"],
+                     ["integration.integrator=semi_implicit", "integration.max_step=0.01"])
+    )  # fmt: skip
     assert np.all(careful.step_errors <= 1e-8)
-    stable = run_scenario(
-        load_scenario(
-            "acrobot_pbvs",
-            [*overrides, "integration.integrator=semi_implicit", "integration.max_step=0.01"],
-        )
-    )
-    assert distance(careful, stable) < 1e-3
+    apart, _ = pose_rows_distance(careful.log["X_WP"], stable.log["X_WP"])
+    assert np.max(apart) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -93,10 +89,7 @@ def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
     [
         (["integration.integrator=semi_implicit"], "found semi_implicit with the engine plant"),
         (["integration.accuracy=1e-9"], "accuracy: found 1e-09 with the engine plant"),
-        (
-            ["integration.engine=mujoco"],
-            "engine: found mujoco; accepted: one of automatic",
-        ),
+        (["integration.engine=mujoco"], "engine: found mujoco; accepted: one of automatic"),
     ],
 )
 def test_what_an_engine_cannot_do_is_refused(overrides, words):
@@ -130,22 +123,20 @@ def test_the_plant_is_what_nobody_asked_otherwise():
 
 
 def test_commanded_tensions_lead_the_platform_the_same_way():
-    runs = [
-        run_tension_scenario(load_scenario("acrobot_computed_torque", ["duration=1.5", *more]))
-        for more in ([], [COMPILED])
-    ]
-    assert distance(*runs) < SAME_TENSIONS_PATH
-    np.testing.assert_allclose(runs[0].log["lengths"], runs[1].log["lengths"], atol=1e-12)
-    assert summarize_tension_run(runs[1])["engine"] == "compiled"
+    plant, compiled, apart = by_both(
+        run_tension_scenario, "acrobot_computed_torque", "duration=0.6"
+    )
+    assert apart < SAME_TENSIONS_PATH
+    np.testing.assert_allclose(plant.log["lengths"], compiled.log["lengths"], atol=1e-12)
+    assert summarize_tension_run(compiled)["engine"] == "compiled"
 
 
 def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_diagram(tmp_path):
     scenario = load_scenario("planar_computed_torque", ["duration=0.35", COMPILED])
     loop = run_tension_scenario(scenario, RunSession(log_folder=tmp_path / "log"))
     seen = []
-    diagram = run_tension_scenario(
-        scenario, RunSession(prepare=lambda _, built: seen.append(built))
-    )
+    look = RunSession(prepare=lambda _, built: seen.append(built))
+    diagram = run_tension_scenario(scenario, look)
     assert seen[0] is diagram.control.diagram
     assert loop.outcome == diagram.outcome == Outcome.COMPLETED
     assert loop.sim_time == diagram.sim_time == 0.35

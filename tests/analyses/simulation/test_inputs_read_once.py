@@ -1,4 +1,4 @@
-"""A result of many runs is of one robot: files that are changed on the way change nothing."""
+"""A result is of files as they were at first; `test_many_runs` has one that is edited meanwhile."""
 
 import hashlib
 import json
@@ -11,7 +11,6 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.analyses.sweeps.worker_pool import with_inputs
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
@@ -24,7 +23,6 @@ from cdpr_drake.schema.input_files import (
     inputs_held,
     inputs_read_once,
 )
-from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.worlds.model_files import mesh_parts
 from tests.models.formats.foreign_files import caspr
 from tests.models.test_drake_parsing import MECHANISM
@@ -34,44 +32,19 @@ SHORT = ["camera.kind=projected", "duration=0.1"]
 OBJ = "v -0.05 -0.05 -0.04\nv {x} 0 0\nv 0 0.1 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 
 
-def write_robot(file, mass=1.5):
+def write_robot(file, mass="1.5"):
     text = robot_file("acrobot_small").read_text()
     assert "  mass: 1.5\n" in text
     file.write_text(text.replace("  mass: 1.5\n", f"  mass: {mass}\n"))
     return file
 
 
-def tensions(runs):
-    return [record.summary["tension_n"] for record in runs.records]
-
-
-@pytest.fixture(scope="module")
-def light(tmp_path_factory):
-    """Tensions of two seeds with the light robot."""
-    file = write_robot(tmp_path_factory.mktemp("robot") / "mine.yaml")
-    return tensions(run_many(with_seeds(scenario(file), [1, 2]), 1))
-
-
-def scenario(file):
-    return load_scenario("acrobot_pbvs", [*SHORT, f"robot={file}"])
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_robot_that_is_edited_while_seeds_run_changes_nothing(workers, light, tmp_path):
-    file = write_robot(tmp_path / "mine.yaml")
-    asked = with_seeds(scenario(file), [1, 2])
-    runs = run_many(asked, workers, lambda progress: write_robot(file, 1.95))
-    assert tensions(runs) == light
-    heavy = tensions(run_many(asked, 1))
-    assert heavy != light  # so that the edit would have been seen
-
-
-def test_a_worker_with_another_file_there_computes_with_ours(light, tmp_path):
+def test_a_worker_with_another_file_there_computes_with_ours(tmp_path):
     file = write_robot(tmp_path / "mine.yaml")
     with inputs_read_once():
         load_robot(file)
         sent = pickle.dumps(with_inputs(load_robot))
-    write_robot(file, 1.95)
+    write_robot(file, "1.95")
     assert pickle.loads(sent)(file).platform.mass == 1.5
     file.unlink()
     assert pickle.loads(sent)(str(file)).platform.mass == 1.5
@@ -114,9 +87,8 @@ def test_meshes_cameras_and_other_tools_files_are_read_once(tmp_path):
 def test_platform_meshes_are_those_that_were_read(tmp_path):
     mesh = tmp_path / "body.obj"
     mesh.write_text(OBJ.format(x=0.04))
-    file = write_robot(tmp_path / "mine.yaml")
-    shape = "  shape: {kind: mesh, file: body.obj, scale: 0.5, position: [0, 0, 0.035]}\n"
-    file.write_text(file.read_text().replace("  mass: 1.5\n", f"  mass: 1.5\n{shape}", 1))
+    shape = "shape: {kind: mesh, file: body.obj, scale: 0.5, position: [0, 0, 0.035]}"
+    file = write_robot(tmp_path / "mine.yaml", f"1.5\n  {shape}")
     with inputs_read_once():
         shape = load_robot(file).platform.shape
         first = shape.extent(np.zeros(3))[1]
@@ -127,7 +99,8 @@ def test_platform_meshes_are_those_that_were_read(tmp_path):
     assert load_robot(file).platform.shape.extent(np.zeros(3))[1][0] < first[0]
 
 
-def test_results_have_the_hash_of_what_was_read(tmp_path):
+def test_results_have_the_hash_of_what_was_read(tmp_path, monkeypatch):
+    monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
     file = write_robot(tmp_path / "mine.yaml")
     wanted = hashlib.sha256(file.read_bytes()).hexdigest()
     cdpr.simulate("acrobot_pbvs", [*SHORT, f"robot={file}"], folder=tmp_path / "run")

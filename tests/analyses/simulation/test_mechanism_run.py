@@ -19,6 +19,7 @@ from cdpr_drake.analyses.simulation.mechanism_run import (
 from cdpr_drake.analyses.simulation.run_loop import advance
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
@@ -41,13 +42,27 @@ ENGINES_APART = 1e-5
 the same, and steps are cut at other places; found 2e-7."""
 
 
+def ran(name, *changes):
+    return run_mechanism_scenario(load_scenario(name, changes))
+
+
 @pytest.fixture(scope="module")
 def bases():
-    return run_mechanism_scenario(load_scenario(BASES))
+    return ran(BASES)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The folder of a command that runs to its end."""
+    folder = tmp_path_factory.mktemp("whole") / "out"
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", BASES, "--duration", "0.4", "--out", str(folder)])
+    assert ended.value.code == 0
+    return folder
 
 
 def test_an_arm_follows_by_computed_torque():
-    done = run_mechanism_scenario(load_scenario(ARM))
+    done = ran(ARM)
     summary = summarize_mechanism_run(done)
     assert done.outcome == Outcome.COMPLETED
     assert summary["rotation_error_rad"]["max"] < BETWEEN_STEPS
@@ -99,18 +114,15 @@ def test_bases_drive_and_a_platform_follows_on_winches(bases):
 def test_a_mechanism_that_shall_stay_stays():
     """At rest on winches with motors that hold: nothing drifts."""
     stays = ["motion.waypoints=[{time: 0.1}]", "duration=0.3"]
-    done = run_mechanism_scenario(load_scenario(BASES, stays))
+    done = ran(BASES, *stays)
     assert summarize_mechanism_run(done)["position_error_m"]["max"] < 1e-10
-    with_nobody = run_mechanism_scenario(
-        load_scenario(ARM, [*stays, "control.kind=winches", "control.prestress=40"])
-    )
+    with_nobody = ran(ARM, *stays, "control.kind=winches", "control.prestress=40")
     assert "motor_forces" not in with_nobody.log
     assert summarize_mechanism_run(with_nobody)["rotation_error_rad"]["max"] < 1e-10
 
 
 def test_both_engines_come_to_the_same(bases):
-    short = ["duration=0.5"]
-    plant = run_mechanism_scenario(load_scenario(BASES, [*short, "integration.engine=plant"]))
+    plant = ran(BASES, "duration=0.5", "integration.engine=plant")
     rows = len(plant.log["time"])
     np.testing.assert_allclose(plant.log["time"], bases.log["time"][:rows])
     for name in ("positions", "unstrained_lengths"):
@@ -120,9 +132,9 @@ def test_both_engines_come_to_the_same(bases):
 
 def test_free_bodies_come_first_in_velocities_but_last_among_joints():
     """Names of columns follow the plant's own order, with an arm on a free platform."""
-    follower = run_mechanism_scenario(
-        load_scenario(BASES, ["mechanism=arm_on_platform", "duration=0.01", "control.prestress=10",
-                              "motion.waypoints=[{time: 1.0, joints: {elbow: -0.5}}]"])
+    follower = ran(
+        BASES, "mechanism=arm_on_platform", "duration=0.01", "control.prestress=10",
+        "motion.waypoints=[{time: 1.0, joints: {elbow: -0.5}}]",
     ).follower  # fmt: skip
     plant, names = follower.plant, follower.velocity_names()
     shoulder = plant.GetJointByName("shoulder")
@@ -154,20 +166,18 @@ def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, 
     assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path)
 
 
-def test_the_command_goes_on_in_its_folder(capsys, tmp_path, monkeypatch):
+def test_the_command_goes_on_in_its_folder(whole, capsys, tmp_path, monkeypatch):
     """Which names mechanism and bodies elsewhere than the scenario that was asked for did."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
     monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
-    asked = ("simulate", BASES, "--duration", "0.4")
-    assert run(capsys, *asked, "--out", "whole")[0] == 0
     with monkeypatch.context() as patch:
         patch.setattr(f"{RUN}.advance", lambda simulator, duration, *others: advance(
             simulator, duration, *others[:2],
             replace(others[2], should_stop=lambda: simulator.get_context().get_time() > 0.15),
             *others[3:],
         ))  # fmt: skip
-        assert run(capsys, *asked, "--out", "out")[0] == 130
+        assert run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out")[0] == 130
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
     bases = tmp_path / "out" / "mechanism.yaml"
     words = bases.read_text()
@@ -177,8 +187,7 @@ def test_the_command_goes_on_in_its_folder(capsys, tmp_path, monkeypatch):
     bases.write_text(words)
     assert run(capsys, "simulate", "--continue", "out")[0] == 0
     for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
-        whole = (tmp_path / "whole" / name).read_bytes()
-        assert (tmp_path / "out" / name).read_bytes() == whole, name
+        assert (tmp_path / "out" / name).read_bytes() == (whole / name).read_bytes(), name
 
 
 def test_a_step_that_is_too_long_is_told_and_the_run_diverges():
@@ -198,24 +207,20 @@ def test_a_motion_that_is_cut_is_told():
     assert "the last of motion.waypoints is at 2 s" in warning
 
 
-def test_command_writes_a_folder_that_runs_again(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    code, out, _ = run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out", "--json")
-    assert code == 0
-    summary = json.loads(out)
+def test_command_writes_a_folder_that_runs_again(whole):
+    summary = json.loads((whole / "summary.json").read_text())
     assert (summary["kind"], summary["mechanism"]) == ("mechanism", "mobile_bases")
-    folder = tmp_path / "out"
-    names = {path.name for path in folder.iterdir()}
+    names = {path.name for path in whole.iterdir()}
     figures = {f"{name}.png" for name in
                ("error", "positions", "tensions", "cable_lengths", "motor_forces")}  # fmt: skip
     assert figures | {"log.csv", "log.npz", "mechanism.yaml", "scenario.yaml", "summary.json",
                       "replay.html"} <= names  # fmt: skip
-    head = (folder / "log.csv").read_text().splitlines()[0].split(",")
+    head = (whole / "log.csv").read_text().splitlines()[0].split(",")
     assert {"positions.base_1::x_m", "way_off.platform::platform.wx_rad", "tensions.C1_n",
             "velocities.base_2::y_m_s", "motor_forces.base_4::y_n"} <= set(head)  # fmt: skip
-    again = load_scenario(str(folder / "scenario.yaml"))
-    assert again.mechanism == str(folder / "mechanism.yaml")
-    page = (folder / "replay.html").read_text()
+    again = load_scenario(str(whole / "scenario.yaml"))
+    assert again.mechanism == str(whole / "mechanism.yaml")
+    page = (whole / "replay.html").read_text()
     data = json.loads(re.search(r'id="cdpr-data">(.*?)</script>', page).group(1))
     assert data["names"] == [f"C{k}" for k in range(1, 9)]
     assert {"time", "tensions", "slack", "places"} == set(data["frames"])
@@ -223,10 +228,8 @@ def test_command_writes_a_folder_that_runs_again(capsys, tmp_path, monkeypatch):
 
 def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
     """Limits that the motion does not keep, while the places where it rests do."""
-    done = run_mechanism_scenario(
-        load_scenario(ARM, ["motion.waypoints=[{time: 0.15, joints: {elbow: -0.4}}]",
-                            "duration=0.3", "control.limits=[2, 40]"])
-    )  # fmt: skip
+    way = "motion.waypoints=[{time: 0.15, joints: {elbow: -0.4}}]"
+    done = ran(ARM, way, "duration=0.3", "control.limits=[2, 40]")
     summary = summarize_mechanism_run(done)
     assert summary["infeasible_steps"] > 0
     pictures = mechanism_pictures(done)

@@ -1,4 +1,4 @@
-"""The summary of a run against what its log says on paper."""
+"""Summary and curves of a run against what its log, written by hand, says on paper."""
 
 from dataclasses import replace
 from importlib.metadata import version
@@ -9,10 +9,12 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.run_summary import (
     camera_path,
+    drift,
     final_errors,
     image_path,
     summarize,
 )
+from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from tests.analyses.simulation.run_by_hand import (
@@ -32,6 +34,16 @@ BY_HAND = 1e-9
 """Pixels, metres and radians through projections, quaternions and back, absolute."""
 
 
+SINGLE_PRECISION = 1e-3
+"""Of pixels below 1600 kept in single precision, absolute."""
+
+WIDE = 2.5
+"""From an image of 640 px to one of 1600 px, as if it had that of the thesis."""
+
+MIDDLE = np.array([319.5, 239.5])
+"""Of the image: the desired pose has the target on the optical axis [px]."""
+
+
 @pytest.fixture(scope="module")
 def hand():
     return run_by_hand()
@@ -42,14 +54,31 @@ def summary(hand):
     return summarize(hand)
 
 
+@pytest.fixture(scope="module")
+def traces(hand):
+    return run_traces(hand)
+
+
+def in_the_image():
+    """Distances from the line, by twice the area over start, end and point [px]."""
+    (ax, ay), length = MIDDLE - SEEN[0], np.linalg.norm(MIDDLE - SEEN[0])
+    return np.abs(ax * (SEEN[FOUND, 1] - SEEN[0, 1]) - ay * (SEEN[FOUND, 0] - SEEN[0, 0])) / length
+
+
+def in_space(servo):
+    """Places of the camera, the end of its line, and distances from that [m]."""
+    places = np.array([(X @ servo.X_PC).translation() for X in platform_poses()])
+    goal = (servo.X_WO @ servo.X_CdO.inverse()).translation()
+    along = (goal - places[0]) / np.linalg.norm(goal - places[0])
+    return places, goal, np.linalg.norm(np.cross(places - places[0], along), axis=1)
+
+
 def test_the_image_path_is_where_the_target_was_seen(hand):
     """In pixels, without the rows that did not see it; the line starts at the first sample."""
     times, path, line = image_path(hand)
     np.testing.assert_array_equal(times, [0.0, 1.5, 3.5])
     np.testing.assert_allclose(path, SEEN[FOUND], atol=BY_HAND)
-    np.testing.assert_allclose(line[0], [100.0, 50.0], atol=BY_HAND)
-    # The desired pose has the target on the optical axis, whose pixel is the middle of the image.
-    np.testing.assert_allclose(line[1], [319.5, 239.5], atol=BY_HAND)
+    np.testing.assert_allclose(line, [[100.0, 50.0], MIDDLE], atol=BY_HAND)
 
 
 def test_the_desired_point_need_not_be_the_middle_of_the_image():
@@ -64,35 +93,35 @@ def test_a_run_that_never_saw_its_target_has_no_image_path(hand):
     times, path, line = image_path(blind)
     assert len(times) == 0
     assert path.shape == (0, 2)
-    np.testing.assert_allclose(line, [[319.5, 239.5]] * 2, atol=BY_HAND)
+    np.testing.assert_allclose(line, [MIDDLE] * 2, atol=BY_HAND)
     assert summarize(blind)["image_deviation_px"] == {"max": None, "mean": None}
 
 
-def test_deviations_in_the_image_by_the_area_of_triangles(hand, summary):
-    """Twice the area over start, end and point, by the length of the line."""
-    start, end = SEEN[0], np.array([319.5, 239.5])
-    (ax, ay), length = end - start, np.linalg.norm(end - start)
-    away = [abs(ax * (v - start[1]) - ay * (u - start[0])) / length for u, v in SEEN[FOUND]]
-    found = summary["image_deviation_px"]
-    assert found["max"] == pytest.approx(max(away), abs=BY_HAND)
-    assert found["mean"] == pytest.approx(sum(away) / 3.0, abs=BY_HAND)
-    # As if the image of 640 px had the 1600 of the thesis.
-    scaled = summary["image_deviation_px_1600x1200"]
-    assert scaled["max"] == pytest.approx(2.5 * max(away), abs=BY_HAND)
-    assert scaled["mean"] == pytest.approx(2.5 * sum(away) / 3.0, abs=BY_HAND)
+def test_the_image_and_deviations_in_it_also_as_if_it_had_1600_pixels(summary, traces):
+    for name, scale in (("image_deviation_px", 1.0), ("image_deviation_px_1600x1200", WIDE)):
+        away = scale * in_the_image()
+        expected = {"max": np.max(away), "mean": np.mean(away)}
+        assert summary[name] == pytest.approx(expected, abs=BY_HAND), name
+    np.testing.assert_array_equal(traces["image_time"], TIMES[FOUND])
+    np.testing.assert_array_equal(traces["image_size"], [1600.0, 1200.0])
+    for name, expected in {
+        "image_path": SEEN[FOUND], "image_line": np.array([SEEN[0], MIDDLE]),
+        "image_deviation": in_the_image(),
+    }.items():  # fmt: skip
+        np.testing.assert_allclose(traces[name], WIDE * expected, atol=BY_HAND, err_msg=name)
 
 
-def test_the_camera_path_runs_from_its_first_sample_to_the_desired_pose(hand, summary):
-    servo = hand.servo
-    track, line = camera_path(hand)
-    places = np.array([(X @ servo.X_PC).translation() for X in platform_poses()])
-    np.testing.assert_allclose(track, places, atol=BY_HAND)
-    goal = (servo.X_WO @ servo.X_CdO.inverse()).translation()
-    np.testing.assert_allclose(line, [places[0], goal], atol=BY_HAND)
-    along = (goal - places[0]) / np.linalg.norm(goal - places[0])
-    away = np.linalg.norm(np.cross(places - places[0], along), axis=1)
-    assert summary["camera_deviation_m"]["max"] == pytest.approx(np.max(away), abs=BY_HAND)
-    assert summary["camera_deviation_m"]["mean"] == pytest.approx(np.mean(away), abs=BY_HAND)
+def test_the_camera_path_runs_from_its_first_sample_to_the_desired_pose(hand, summary, traces):
+    servo, (places, goal, away) = hand.servo, in_space(hand.servo)
+    for track, line in (camera_path(hand), (traces["camera_path"], traces["camera_line"])):
+        np.testing.assert_allclose(track, places, atol=BY_HAND)
+        np.testing.assert_allclose(line, [places[0], goal], atol=BY_HAND)
+    expected = {"max": np.max(away), "mean": np.mean(away)}
+    assert summary["camera_deviation_m"] == pytest.approx(expected, abs=BY_HAND)
+    np.testing.assert_allclose(traces["camera_deviation"], away, atol=BY_HAND)
+    last = pose_row(platform_poses()[-1] @ servo.X_PC)
+    wanted = pose_row(servo.X_WO @ servo.X_CdO.inverse())
+    np.testing.assert_allclose(traces["camera_ends"], [last, wanted], atol=BY_HAND)
 
 
 def test_a_camera_in_the_world_is_seen_from_its_target():
@@ -206,3 +235,53 @@ def test_a_diverged_run_has_no_numbers_and_no_warnings(hand):
     assert found["outcome"] == "diverged"
     assert found["tension_n"] == {"min": None, "max": None}
     assert found["final_position_error_m"] is None
+
+
+def test_drift_is_the_slope_of_the_second_half():
+    """A start that settles does not count, nor does a steady error."""
+    times = np.linspace(0.0, 120.0, 601)
+    settles = 0.5 * np.exp(-times)
+    expected = 60.0 * 62e-6
+    assert drift(times, 1e-3 + settles + 62e-6 * times) == pytest.approx(expected, rel=1e-6)
+    assert drift(times, np.full(601, 1e-3)) == pytest.approx(0.0, abs=1e-15)
+    assert drift(times[:4], np.zeros(4)) is None
+
+
+# Curves.
+
+
+def test_errors_and_what_is_taken_over(hand, traces):
+    p = np.array([X.translation() for X in platform_poses()])
+    np.testing.assert_array_equal(traces["platform_path"], p)
+    p[:, 1] += ESTIMATE_OFF
+    np.testing.assert_allclose(traces["estimate_path"], p, atol=BY_HAND)
+    np.testing.assert_allclose(traces["estimate_distance"], ESTIMATE_OFF, atol=BY_HAND)
+    np.testing.assert_allclose(traces["estimate_angle"], ESTIMATE_TURNED, atol=BY_HAND)
+    assert np.all(np.isnan(traces["error"][1]))  # no gain: the target was not seen
+    seen = [0, 2, 3]
+    np.testing.assert_array_equal(traces["error"][seen], hand.log["error"][seen])
+    for key in ("time", "cable_velocities", "tensions"):
+        np.testing.assert_array_equal(traces[key], hand.log[key])
+
+
+def test_the_jump_is_of_the_error_and_not_of_the_path(hand, traces):
+    """Errors of 1, 4, 2 and 3 mm along one direction: the largest change is 3 mm."""
+    assert estimate_jump(traces) == pytest.approx(0.003, abs=BY_HAND)
+    one = {key: traces[key][:1] for key in ("platform_path", "estimate_path")}
+    assert estimate_jump(one) == 0.0
+    two = {key: traces[key][2:] for key in ("platform_path", "estimate_path")}
+    assert estimate_jump(two) == pytest.approx(0.001, abs=BY_HAND)
+    rows = np.array([pose_row(X) for X in platform_poses()])
+    exact = run_traces(replace(hand, log=hand.log | {"X_WP_estimated": rows}))
+    assert estimate_jump(exact) == 0.0
+
+
+def test_corners_are_kept_where_the_object_was_seen(hand, traces):
+    pinhole, servo = hand.servo.pinhole, hand.servo
+    assert traces["corner_paths"].shape == (3, 4, 2)
+    seen = hand.log[f"{servo.target.mark}_px"][FOUND].reshape(-1, 4, 2)
+    np.testing.assert_allclose(traces["corner_paths"], WIDE * seen, atol=SINGLE_PRECISION)
+    goals = np.array(
+        [pinhole.project((servo.X_CdO @ p)[:, None])[:, 0] for p in servo.target.points.T]
+    )
+    np.testing.assert_allclose(traces["corner_goals"], WIDE * goals, atol=BY_HAND)

@@ -1,3 +1,1 @@
 """Tests of `cdpr_drake.analyses.statics`."""
-
-"""Tests of `cdpr_drake.analyses.statics`."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.common.yaml import yaml_dump_typed
 
 import cdpr_drake as cdpr
 from cdpr_drake.cables.cable_behaviour import tension_of_strain
@@ -83,25 +84,19 @@ def test_what_does_not_know_them_says_so(tmp_path, capsys):
     assert CableSettings().cable_set(robot(stiffening=0.0)).count == 8
 
 
-def test_the_command_prints_drum_tensions(tmp_path, capsys):
-    from pydrake.common.yaml import yaml_dump_typed
-
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ([], "tensions at the drums while cable is wound up [N]:"),
+        (["--no-pulleys"], "note: sheave_friction 0.03 of irma4u does nothing without pulleys"),
+    ],
+)
+def test_the_command_prints_drum_tensions_or_that_friction_does_nothing(
+    tmp_path, capsys, more, words
+):
     path = tmp_path / "robot.yaml"
     path.write_text(yaml_dump_typed(robot("irma4u", sheave_friction=FRICTION)))
     with pytest.raises(SystemExit) as ended:
-        main(["static", str(path), "--pose", "0,0,0.4,0,0,0"])
-    said = capsys.readouterr().out
+        main(["static", str(path), "--pose", "0,0,0.4,0,0,0", *more])
     assert ended.value.code == 0
-    assert "tensions at the drums while cable is wound up [N]:" in said
-
-
-def test_friction_without_pulleys_is_said_to_do_nothing(tmp_path, capsys):
-    from pydrake.common.yaml import yaml_dump_typed
-
-    path = tmp_path / "robot.yaml"
-    path.write_text(yaml_dump_typed(robot("irma4u", sheave_friction=FRICTION)))
-    with pytest.raises(SystemExit) as ended:
-        main(["static", str(path), "--pose", "0,0,0.4,0,0,0", "--no-pulleys"])
-    assert ended.value.code == 0
-    words = "note: sheave_friction 0.03 of irma4u does nothing without pulleys"
-    assert words in printed(capsys).err
+    assert words in "".join(printed(capsys))

@@ -1,34 +1,49 @@
 """Studies whose measurement is made up: whether statements can fail, and what is written."""
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.framework.study import Study, StudyResult
-
-MadeUp = Callable[..., dict[str, Any]]
-"""Row of a case with a seed; with `wrong` one that is contrary to what statements say."""
 
 
-def results(study: Study, made_up: MadeUp, wrong: bool = False) -> StudyResult:
-    """A study in its quick form with rows that are made up."""
-    return replace(study, measure=partial(made_up, wrong=wrong))(True, StudySession(workers=1))
+def made(study, made_up, quick=True, seeds=None):
+    """A study with rows that are made up: `made_up(case, seed)`."""
+    return replace(study, measure=made_up)(quick, StudySession(workers=1, seeds=seeds))
 
 
-def check_statements_tell_apart(study: Study, made_up: MadeUp) -> None:
-    """All statements hold of good rows, and none of contrary ones."""
+def verdicts(found):
+    """Of the statements of a study, by name: with how many parts hold where it is in part."""
+    return {one.name: one.verdict_words for one in found.statements}
+
+
+def with_figures(found, *names):
+    """A study that writes some of its figures, and names of all that it draws: to lay all of them
+    out takes long."""
+    drawn = set()
+    for name, draw in found.drawings().items():
+        with suppress(NothingToDraw):
+            assert draw().axes
+            drawn.add(name)
+    figures = {name: found.study.figures[name] for name in names}
+    return replace(found, study=replace(found.study, figures=figures)), drawn
+
+
+def check_tables_are_made(found):
+    """None is left out, and none is empty."""
+    tables = found.tables()
+    assert all(table.row_count for table in tables)
+    assert "not made" not in {str(column.header) for table in tables for column in table.columns}
+
+
+def check_told_apart_and_written(study, made_up, folder):
+    """All statements hold of good rows, and none of contrary ones; of both a figure is drawn."""
+    name = study.name.replace("-", "_")
     for wrong, verdict in ((False, "confirmed"), (True, "not confirmed")):
-        assert {one.verdict for one in results(study, made_up, wrong).statements} == {verdict}
-
-
-def check_written(study: Study, made_up: MadeUp, folder: Path) -> None:
-    """Tables, and a figure of the study's name, of good rows and of contrary ones."""
-    for wrong in (False, True):
-        found = results(study, made_up, wrong)
+        found = made(study, partial(made_up, wrong=wrong))
+        assert {one.verdict for one in found.statements} == {verdict}
         assert len(found.tables()) > 0
-        (folder / str(wrong)).mkdir()
-        assert not found.write(folder / str(wrong))
-        assert (folder / str(wrong) / f"{study.name}.png").is_file()
+        assert with_figures(found)[1] == {name} == set(study.figures)
+    assert not found.write(folder)
+    assert (folder / f"{name}.png").is_file()

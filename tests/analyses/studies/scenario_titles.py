@@ -1,12 +1,8 @@
 """What the title of each shipped scenario names, as a check of a run's summary and log.
 
-Runs are those of the quick form of the study `scenarios`; what only a diagram can do gets a short
-run of its own, with events that come sooner.
+Runs are those of the quick form of the study `scenarios`; what only a diagram can do is made short,
+with events that come sooner.
 """
-
-from collections.abc import Callable
-from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -79,16 +75,9 @@ def has(*columns):
     return lambda run: all(name in run.log for name in columns)
 
 
-@dataclass(frozen=True)
-class Title:
-    """What is asked of a run, all of it; and what makes a run of its own short."""
-
-    checks: tuple[Callable[[SimpleNamespace], bool], ...]
-    items: tuple[str, ...] = ()
-
-
 def of(*checks, items=()):
-    return Title(checks, tuple(items))
+    """What is asked of a run, all of it; and what makes a run of its own short."""
+    return checks, items
 
 
 def mode_goes_over(run):

@@ -48,10 +48,25 @@ def expected(tasks):
     return {name: task(0, task.grid.size)["feasible"] for name, (task, _) in tasks.items()}
 
 
+@pytest.fixture
+def kept(tmp_path):
+    """Makes the folder of a sweep, or finds it again."""
+    return lambda: SweepFolder(tmp_path / "s", ARGUMENTS)
+
+
 def same(result, expected):
     assert result.arrays.keys() == expected.keys()
     for name, values in expected.items():
         np.testing.assert_array_equal(result.arrays[name]["feasible"], values)
+
+
+def stopped(tasks, size, folder=None, after=500):
+    """A sweep that is told to stop once so much is done."""
+    reports = []
+    return run_sweep(
+        tasks, size, folder, on_progress=reports.append,
+        should_stop=lambda: reports[-1].done >= after,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("chunk_size", [1014, 100, 37])
@@ -67,90 +82,77 @@ def test_two_processes_find_the_same_and_report_progress(tasks, expected):
     assert reports[-1].speed > 0.0
 
 
-def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, tmp_path):
-    reports = []
-    first = run_sweep(
-        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
-        should_stop=lambda: len(reports) > 5,
-    )  # fmt: skip
+def test_a_stopped_sweep_continues_where_it_stopped(tasks, expected, kept):
+    first = stopped(tasks, 100, kept())
     assert first.arrays is None
     assert (first.progress.done, first.progress.what, first.finished) == (500, "slack", {})
-    second = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
-    assert second.progress.found == 500
-    same(second, expected)
-    third = run_sweep(tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS))
-    assert third.progress.found == third.progress.total
-    same(third, expected)
+    for found in (500, 2028):
+        again = run_sweep(tasks, 100, kept())
+        assert again.progress.found == found
+        same(again, expected)
 
 
-def test_a_folder_with_chunks_of_another_size_gives_the_same(tasks, expected, tmp_path):
-    reports = []
-    run_sweep(
-        tasks, 100, SweepFolder(tmp_path / "s", ARGUMENTS), on_progress=reports.append,
-        should_stop=lambda: len(reports) > 5,
-    )  # fmt: skip
+def test_a_folder_with_chunks_of_another_size_gives_the_same(tasks, expected, kept):
+    stopped(tasks, 100, kept())
     for size in (37, 200, 100):
-        same(run_sweep(tasks, size, SweepFolder(tmp_path / "s", ARGUMENTS)), expected)
+        same(run_sweep(tasks, size, kept()), expected)
 
 
 def test_finished_tasks_of_a_stopped_sweep_are_there(tasks, expected):
-    reports = []
-    stopped = run_sweep(
-        tasks, 500, on_progress=reports.append, should_stop=lambda: reports[-1].done > 1014
-    )
-    assert stopped.arrays is None
-    assert list(stopped.finished) == ["slack"]
-    np.testing.assert_array_equal(stopped.finished["slack"]["feasible"], expected["slack"])
+    first = stopped(tasks, 500, after=1015)
+    assert first.arrays is None
+    assert list(first.finished) == ["slack"]
+    np.testing.assert_array_equal(first.finished["slack"]["feasible"], expected["slack"])
 
 
-def test_a_finished_sweep_is_one_file_and_is_found_again(tasks, expected, tmp_path):
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+def test_a_finished_sweep_is_one_file_and_is_found_again(tasks, expected, tmp_path, kept):
+    folder = kept()
     folder.finish(run_sweep(tasks, 500, folder).arrays)
     assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]
-    again = run_sweep(tasks, 77, SweepFolder(tmp_path / "s", ARGUMENTS))  # cut as one likes
+    again = run_sweep(tasks, 77, kept())  # cut as one likes
     assert again.progress.found == again.progress.total == 2028
     same(again, expected)
     whole = tmp_path / "s" / "parts.npz"
     whole.write_bytes(whole.read_bytes()[:-100])
-    damaged = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    damaged = run_sweep(tasks, 500, kept())
     assert damaged.progress.found == 0
     same(damaged, expected)
 
 
-def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path):
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+def test_what_others_put_beside_the_chunks_stays(tasks, tmp_path, kept):
+    folder = kept()
     arrays = run_sweep(tasks, 500, folder).arrays
     chunks = tmp_path / "s" / "chunks"
-    (chunks / "notes.txt").write_text("mine")
-    (chunks / "mine.npz").write_text("mine")
+    for name in ("notes.txt", "mine.npz"):
+        (chunks / name).write_text("mine")
     own = next(path for path in chunks.iterdir() if path.name.endswith("500.npz"))
     new_part(own)  # of who was killed
     folder.finish(arrays)
     assert sorted(os.listdir(chunks)) == ["mine.npz", "notes.txt"]
 
 
-def test_who_is_killed_at_the_start_leaves_a_folder_that_can_be_used(tasks, tmp_path):
+def test_who_is_killed_at_the_start_leaves_a_folder_that_can_be_used(tasks, tmp_path, kept):
     (tmp_path / "s").mkdir()
     mark(tmp_path / "s")
     new_part(tmp_path / "s" / "arguments.json").write_text("{")
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    kept()
     new_part(tmp_path / "s" / "parts.npz")  # and another one at the end
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    folder = kept()
     folder.finish(run_sweep(tasks, 500, folder).arrays)
     assert sorted(os.listdir(tmp_path / "s")) == [MARKER, "arguments.json", "parts.npz"]
 
 
-def test_a_damaged_chunk_is_computed_again(tasks, expected, tmp_path):
-    run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+def test_a_damaged_chunk_is_computed_again(tasks, expected, tmp_path, kept):
+    run_sweep(tasks, 500, kept())
     chunk = sorted((tmp_path / "s" / "chunks").iterdir())[0]
     chunk.write_bytes(chunk.read_bytes()[:100])
-    again = run_sweep(tasks, 500, SweepFolder(tmp_path / "s", ARGUMENTS))
+    again = run_sweep(tasks, 500, kept())
     assert again.progress.found == 2028 - 500
     same(again, expected)
 
 
-def test_a_folder_of_other_arguments_is_refused_by_name_of_the_difference(tmp_path):
-    SweepFolder(tmp_path / "s", ARGUMENTS)
+def test_a_folder_of_other_arguments_is_refused_by_name_of_the_difference(tmp_path, kept):
+    kept()
     other = ARGUMENTS | {"seed": 2, "bounds": {"r_A": 0.01, "r_B": 0.005}}
     with pytest.raises(OutputFolderError) as refused:
         SweepFolder(tmp_path / "s", other)
@@ -161,32 +163,28 @@ def test_a_folder_of_other_arguments_is_refused_by_name_of_the_difference(tmp_pa
     assert "\n" not in words
 
 
-def test_other_folders_are_refused_and_left_alone(tmp_path):
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "thesis.txt").write_text("x")
-    with pytest.raises(OutputFolderError, match="holds files already"):
-        SweepFolder(tmp_path / "mine", ARGUMENTS)
-    with pytest.raises(OutputFolderError, match="found a file"):
-        SweepFolder(tmp_path / "mine" / "thesis.txt", ARGUMENTS)
-    assert os.listdir(tmp_path / "mine") == ["thesis.txt"]
-    (tmp_path / "mine" / "thesis.txt").unlink()
-    (tmp_path / "mine" / "arguments.json").write_text("{")
-    with pytest.raises(OutputFolderError, match="no JSON"):
-        SweepFolder(tmp_path / "mine", ARGUMENTS)
-
-
-def test_other_folders_are_refused_before_anything_is_computed(tmp_path):
-    (tmp_path / "thesis.txt").write_text("x")
+def test_other_folders_are_refused_before_anything_is_computed_and_left_alone(tmp_path):
+    thesis = tmp_path / "thesis.txt"
+    thesis.write_text("x")
 
     def computed(*_):
         raise AssertionError("it was computed first")
 
     study = Study(name="other", title="Other", cases=lambda _: [], parameters=computed)
-    with pytest.raises(OutputFolderError, match="holds files already"):
-        study(session=StudySession(folder=tmp_path))
-    with pytest.raises(OutputFolderError, match="holds files already"):
-        run_poses(ARGUMENTS, {"a": (computed, 1)}, 1, dict, Path, SweepOptions(tmp_path))
+    for use in (
+        lambda: SweepFolder(tmp_path, ARGUMENTS),
+        lambda: study(session=StudySession(folder=tmp_path)),
+        lambda: run_poses(ARGUMENTS, {"a": (computed, 1)}, 1, dict, Path, SweepOptions(tmp_path)),
+    ):
+        with pytest.raises(OutputFolderError, match="holds files already"):
+            use()
+    with pytest.raises(OutputFolderError, match="found a file"):
+        SweepFolder(thesis, ARGUMENTS)
     assert os.listdir(tmp_path) == ["thesis.txt"]
+    thesis.unlink()
+    (tmp_path / "arguments.json").write_text("{")
+    with pytest.raises(OutputFolderError, match="no JSON"):
+        SweepFolder(tmp_path, ARGUMENTS)
 
 
 def test_differences_are_named_wherever_they_are():
@@ -201,19 +199,10 @@ def test_differences_are_named_wherever_they_are():
     assert not list(differences(there, json.loads(json.dumps(there))))
 
 
-def test_a_scheduler_that_does_not_answer_is_named(tasks, monkeypatch):
-    monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", 0.5)
-    with pytest.raises(SweepError) as refused:
-        run_sweep(tasks, 500, scheduler="tcp://127.0.0.1:9")
-    assert "tcp://127.0.0.1:9: does not answer" in str(refused.value)
-    assert "on this machine" in str(refused.value)
-    assert "\n" not in str(refused.value)
-    with pytest.raises(SweepError, match="nonsense: does not answer"):
-        run_sweep(tasks, 500, scheduler="nonsense")
-
-
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nonsense"])
-def test_a_client_that_failed_is_closed_at_once(monkeypatch, address):
+def test_a_scheduler_that_does_not_answer_is_named_and_its_client_closed_at_once(
+    monkeypatch, address
+):
     # One that is left to the garbage collector takes a lock there, which deadlocks with the start
     # of another.
     from distributed import Client
@@ -222,12 +211,15 @@ def test_a_client_that_failed_is_closed_at_once(monkeypatch, address):
     gc.collect()
     gc.disable()
     try:
-        with pytest.raises(SweepError):
+        with pytest.raises(SweepError) as refused:
             run_sweep({}, 20, scheduler=address)
         left = [thing.status for thing in gc.get_objects() if issubclass(type(thing), Client)]
     finally:
         gc.enable()
     assert set(left) == {"closed"}
+    assert f"{address}: does not answer" in str(refused.value)
+    assert "on this machine" in str(refused.value)
+    assert "\n" not in str(refused.value)
 
 
 def _dask(*arguments):
@@ -237,48 +229,48 @@ def _dask(*arguments):
 
 
 class Cluster:
-    """A Dask scheduler and two workers; what a test has killed is started again for the next."""
+    """A Dask scheduler and its workers; what a test has killed is started again where it is asked
+    for."""
 
     def __init__(self, folder):
-        self.folder, self.started = folder, 0
-        self.address, self.scheduler, self.workers = "", None, []
-
-    def whole(self):
-        """Address of the scheduler, its process, and those of its workers, which it knows."""
-        if self.scheduler is None or self.scheduler.poll() is not None:
-            self.end()
-            self.begin()
-        self.workers = [worker for worker in self.workers if worker.poll() is None]
-        while len(self.workers) < 2:
-            self.workers.append(
-                _dask(
-                    "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1",
-                    "--no-dashboard", "--local-directory", str(self.folder), self.address,
-                )
-            )  # fmt: skip
-        wait_for_workers(self.address, {worker.pid for worker in self.workers})
-        return self.address, self.scheduler, list(self.workers)
+        self.folder, self.address, self.scheduler, self.started = folder, "", None, 0
+        self.workers = {}
+        """By the names that the scheduler has of them."""
 
     def begin(self):
-        self.started += 1
-        file = self.folder / f"scheduler{self.started}.json"
+        self.address, file = "", self.folder / "scheduler.json"
+        file.unlink(missing_ok=True)
         self.scheduler = _dask(
             "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0",
             "--no-dashboard", "--scheduler-file", str(file),
         )  # fmt: skip
-        self.address = ""
         while not self.address:  # the file may be there before its text is
             assert self.scheduler.poll() is None
             with suppress(FileNotFoundError, json.JSONDecodeError):
                 self.address = json.loads(file.read_text())["address"]
             time.sleep(0.05)
 
+    def of(self, count):
+        """Address of the scheduler, and at least so many workers, which it knows."""
+        if self.scheduler is None or self.scheduler.poll() is not None:
+            self.end()
+            self.begin()
+        alive = {name: one for name, one in self.workers.items() if one.poll() is None}
+        while len(alive) < count:
+            self.started += 1
+            name = f"worker {self.started}"
+            alive[name] = _dask(
+                "distributed.cli.dask_worker", "--no-nanny", "--nthreads", "1", "--no-dashboard",
+                "--name", name, "--local-directory", str(self.folder), self.address,
+            )  # fmt: skip
+        self.workers = alive
+        wait_for_workers(self.address, set(alive))
+        return self.address, list(alive.values())
+
     def end(self):
-        for process in (self.scheduler, *self.workers):
-            if process is not None:
-                process.kill()
-                process.wait()
-        self.workers = []
+        for process in (*self.workers.values(), *([self.scheduler] if self.scheduler else [])):
+            process.kill()
+            process.wait()
 
 
 @pytest.fixture(scope="module")
@@ -290,69 +282,32 @@ def cluster_of_all(tmp_path_factory):
 
 @pytest.fixture
 def cluster(cluster_of_all, monkeypatch):
-    """See `Cluster.whole`."""
+    """See `Cluster.of`."""
     monkeypatch.setattr(sweep_workers, "SCHEDULER_TIMEOUT", PATIENCE)
-    return cluster_of_all.whole()
+    return cluster_of_all
 
 
-def wait_for_workers(address, pids):
-    """Until a scheduler knows these processes and no others."""
+def wait_for_workers(address, names):
+    """Until a scheduler knows these workers and no others.
+
+    It is asked, and not the workers: one that was killed may be known for a moment, and never
+    answers.
+    """
     from distributed import Client
 
     deadline = time.monotonic() + PATIENCE
     with Client(address, timeout=PATIENCE, set_as_default=False) as client:
-        # One that was killed may be known for a moment.
-        while set(client.run(os.getpid, on_error="return").values()) != pids:
+        while names != {one["name"] for one in client.scheduler_info()["workers"].values()}:
             assert time.monotonic() < deadline
             time.sleep(0.05)
 
 
-def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, tmp_path):
-    address, _, workers = cluster
-    killed = []
-
-    def kill_one(progress):
-        if progress.done > 300 and not killed:
-            workers[0].send_signal(signal.SIGKILL)
-            killed.append(progress.done)
-
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
-    result = run_sweep(tasks, 20, folder, scheduler=address, on_progress=kill_one)
-    assert killed
-    assert killed[0] < 1500
-    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
-    same(result, expected)
-
-
-def test_runs_over_seeds_on_a_cluster_that_loses_a_worker_are_those_of_this_machine(cluster):
-    scenario = load_scenario(
-        "acrobot_pbvs", ["camera.kind=projected", "duration=0.1", "integration.loop=compiled"]
-    )
-    scenarios = with_seeds(scenario, range(6))
-    here = run_many(scenarios, 1, keep_traces=True)
-    address, _, workers = cluster
-
-    def kill_one(progress):
-        if progress.done == 1:
-            workers[0].send_signal(signal.SIGKILL)
-
-    there = run_many(scenarios, None, kill_one, keep_traces=True, scheduler=address)
-    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
-    assert [record.seed for record in there.records] == list(range(6))
-    for one, other in zip(here.records, there.records, strict=True):
-        assert one.end.tobytes() == other.end.tobytes()
-        assert {n: a.tobytes() for n, a in one.traces.items()} == {
-            n: a.tobytes() for n, a in other.traces.items()
-        }
-
-
-def test_a_cluster_with_other_code_is_refused(tasks, cluster, tmp_path, monkeypatch):
+def test_a_cluster_with_other_code_is_refused(tasks, cluster, monkeypatch):
     """Its numbers could be others, and once were taken without a word."""
-    address, _, _ = cluster
+    address, _ = cluster.of(2)
     monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.code_version", lambda: "0.0.1 other")
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
     with pytest.raises(SweepError, match=r"a worker of the cluster has cdpr_drake .*0\.0\.1 other"):
-        run_sweep(tasks, 20, folder, scheduler=address)
+        run_sweep(tasks, 20, scheduler=address)
 
 
 def refuse():
@@ -373,37 +328,74 @@ class Failing:
         raise NotSendable
 
 
-def test_an_error_that_cannot_be_sent_is_an_error_all_the_same(cluster, tmp_path):
+def test_an_error_that_cannot_be_sent_is_an_error_all_the_same(cluster):
     """It once kept the sweep waiting for ever."""
-    address, _, _ = cluster
-    folder = SweepFolder(tmp_path / "s", ARGUMENTS)
+    address, _ = cluster.of(2)
     with pytest.raises(Exception, match="NotSendable"):  # Dask has its words only
-        run_sweep({"failing": (Failing(), 40)}, 20, folder, scheduler=address)
+        run_sweep({"failing": (Failing(), 40)}, 20, scheduler=address)
 
 
-def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, tmp_path):
-    address, scheduler, _ = cluster
-    with pytest.raises(SweepError, match=r"was lost on the way .* run again to continue"):
-        run_sweep(
-            tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS), scheduler=address,
-            on_progress=lambda progress: scheduler.kill() if progress.done > 100 else None,
-        )  # fmt: skip
-    again = run_sweep(tasks, 20, SweepFolder(tmp_path / "s", ARGUMENTS))
-    assert 100 < again.progress.found < 2028
-    same(again, expected)
+def test_a_cluster_that_loses_a_worker_finds_the_same(tasks, expected, cluster, kept):
+    address, workers = cluster.of(2)
+    killed = []
+
+    def kill_one(progress):
+        if progress.done > 300 and not killed:
+            workers[0].send_signal(signal.SIGKILL)
+            killed.append(progress.done)
+
+    result = run_sweep(tasks, 20, kept(), scheduler=address, on_progress=kill_one)
+    assert killed
+    assert killed[0] < 1500
+    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
+    same(result, expected)
+
+
+def test_runs_over_seeds_on_a_cluster_that_loses_a_worker_are_those_of_this_machine(cluster):
+    scenario = load_scenario(
+        "acrobot_pbvs", ["camera.kind=projected", "duration=0.1", "integration.loop=compiled"]
+    )
+    scenarios = with_seeds(scenario, range(6))
+    here = run_many(scenarios, 1, keep_traces=True)
+    address, workers = cluster.of(2)
+
+    def kill_one(progress):
+        if progress.done == 1:
+            workers[0].send_signal(signal.SIGKILL)
+
+    there = run_many(scenarios, None, kill_one, keep_traces=True, scheduler=address)
+    assert workers[0].wait(PATIENCE) == -signal.SIGKILL
+    assert [record.seed for record in there.records] == list(range(6))
+    for one, other in zip(here.records, there.records, strict=True):
+        assert one.end.tobytes() == other.end.tobytes()
+        assert {n: a.tobytes() for n, a in one.traces.items()} == {
+            n: a.tobytes() for n, a in other.traces.items()
+        }
 
 
 def test_a_cluster_without_workers_is_said(tasks, cluster):
-    address, _, workers = cluster
+    address, workers = cluster.of(1)
     for worker in workers:
         worker.kill()
         worker.wait()
     deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:  # the scheduler may know them for a moment
-        with suppress(SweepError):
+
+    def ask():
+        while time.monotonic() < deadline:  # the scheduler may know them for a moment
             run_sweep({}, 20, scheduler=address)
             time.sleep(0.2)
-            continue
-        break
+
     with pytest.raises(SweepError, match="has no workers"):
-        run_sweep({}, 20, scheduler=address)
+        ask()
+
+
+def test_a_scheduler_that_is_lost_keeps_what_was_finished(tasks, expected, cluster, kept):
+    address, _ = cluster.of(1)
+    with pytest.raises(SweepError, match=r"was lost on the way .* run again to continue"):
+        run_sweep(
+            tasks, 20, kept(), scheduler=address,
+            on_progress=lambda p: cluster.scheduler.kill() if p.done > 100 else None,
+        )  # fmt: skip
+    again = run_sweep(tasks, 20, kept())
+    assert 100 < again.progress.found < 2028
+    same(again, expected)

@@ -1,3 +1,1 @@
 """Tests of `cdpr_drake.analyses.workspaces`."""
-
-"""Tests of `cdpr_drake.analyses.workspaces`."""

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.models.formats.tree_files import Cable, Link, Model
+
 EXITS = np.array(
     [
         [-2.0, 1.5, 2.0], [2.0, 1.5, 2.1], [2.0, -1.5, 2.2], [-2.0, -1.5, 2.3],
@@ -61,44 +63,19 @@ def caspr(
         The bodies' file.
     """
     q = words([*HOME, *ANGLES]) if q is None else q
-    link = f"""<link_rigid num="1" name="Toy">
-      <joint type="{joint}" q_initial="{q}"/>
-      <physical><mass>{MASS}</mass><com_location>{words(COM)}</com_location>
-        <end_location>0 0 0</end_location>
-        <inertia ref="com"><Ixx>0.1</Ixx><Iyy>0.2</Iyy><Izz>0.25</Izz><Ixy>0.01</Ixy>
-          <Ixz>0.0</Ixz><Iyz>-0.02</Iyz></inertia></physical>
-      <parent><num>0</num><location>0 0 0</location></parent></link_rigid>"""
-    bodies = folder / f"{name}_bodies.xml"
-    bodies.write_text(
-        '<?xml version="1.0" encoding="utf-8"?>\n'
-        '<!DOCTYPE bodies_system SYSTEM "../../templates/bodies.dtd">\n'
-        f'<bodies_system><links display_range="-3 3 -3 3 0 3">{link * links}</links>'
-        "</bodies_system>",
-        encoding="utf-8",
-    )
-    items = []
-    shift = COM if reference == "com" else np.zeros(3)
+    link = Link(joint, q, name="Toy", mass=f"{MASS}", com=words(COM), inertia=words(INERTIA))
+    cables, shift = [], COM if reference == "com" else np.zeros(3)
     for k, (A, B) in enumerate(zip(points[0].T, points[1].T, strict=True)):
-        base = f"<attachment><link>0</link><location>{words(A)}</location></attachment>"
-        if pulley:
-            base = (
-                f"<base_rotating_pulley><fixed_location>{words(A)}</fixed_location>"
-                f"<pulley_radius>{0.04 + 0.001 * k}</pulley_radius>"
-                "<cable_entry_vector>0 1 1</cable_entry_vector></base_rotating_pulley>"
-            )
-        items.append(
-            f'<cable_ideal name="cable {k + 1}" attachment_reference="{reference}"><properties>'
-            f"<force_min>{k}</force_min><force_max>{700 + k}</force_max></properties><attachments>"
-            f"{base}<attachment><link>1</link><location>{words(B - shift)}</location></attachment>"
-            "</attachments></cable_ideal>"
+        base = (
+            f"<base_rotating_pulley><fixed_location>{words(A)}</fixed_location>"
+            f"<pulley_radius>{0.04 + 0.001 * k}</pulley_radius>"
+            "<cable_entry_vector>0 1 1</cable_entry_vector></base_rotating_pulley>"
         )
-    (folder / f"{name}_cables.xml").write_text(
-        "<!DOCTYPE cables [<!ATTLIST cable_set id ID #REQUIRED>]>"
-        '<cables default_cable_set="second"><cable_set id="first"/>'
-        f'<cable_set id="second">{"".join(items)}</cable_set></cables>',
-        encoding="utf-8",
-    )
-    return bodies
+        ends = [base if pulley else (0, words(A)), (1, words(B - shift))]
+        limits = f"<force_min>{k}</force_min><force_max>{700 + k}</force_max>"
+        cables.append(Cable(ends, f"cable {k + 1}", reference, properties=limits))
+    model = Model([link] * links, cables, {"first": []}, name, "second", "-3 3 -3 3 0 3")
+    return model.write(folder)
 
 
 def wirex(folder: Path) -> Path:

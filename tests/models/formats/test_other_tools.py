@@ -1,16 +1,18 @@
-"""What MuJoCo, Drake and CASPR's formula say of exported files: rest, motion, lengths, warnings."""
+"""What MuJoCo, Drake, CASPR's formula and firmwares say of exports: rest, lengths, motors."""
 
+import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import (
     LoadModelDirectivesFromString,
     Parser,
     ProcessModelDirectives,
 )
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake import models
@@ -22,6 +24,7 @@ from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_in_plant import add_robot, find_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.assembly import add_cable_robot
+from tests.models.formats.foreign_files import REPRAP, saved
 from tests.models.formats.unusual_robots import ALL, exported, made, written
 
 EXACT = 1e-12
@@ -60,17 +63,6 @@ def test_it_is_at_rest_at_home_and_motors_add_nothing(name):
         why = f"is no pose of rest, since {problem}"
     assert export_omissions(robot, "mjcf").get("home", "") == why
     assert (np.max(np.abs(data.qacc)) < AT_REST) == (why == "")
-
-
-def test_it_stays_at_home():
-    mujoco, model, data = at_home("acrobot_large")
-    robot = made("acrobot_large")
-    ends = robot.home.transform().multiply(robot.anchor_points()) - robot.exit_points()
-    lengths = np.linalg.norm(ends, axis=0)
-    np.testing.assert_allclose(data.ten_length, lengths, atol=EXACT)
-    for _ in range(200):
-        mujoco.mj_step(model, data)
-    np.testing.assert_allclose(data.ten_length, lengths, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["cogiro", "caroca_gazebo", "everything", "flat"])
@@ -186,27 +178,24 @@ def packed(plant, folder):
     return plant
 
 
-def moved(put):
-    """Where the platform is after a while that begins with a velocity."""
+def rates(put):
+    """Of the state in which the platform has left its home pose with a velocity."""
     robot, builder = made(SMALL), DiagramBuilder()
     plant = builder.AddSystem(MultibodyPlant(0.0))
     in_plant = put(plant, robot)
     blocks = add_cable_robot(builder, in_plant)
-    diagram = builder.Build()
-    context = diagram.CreateDefaultContext()
-    own = plant.GetMyMutableContextFromRoot(context)
-    home = robot.home.transform().GetAsMatrix4()
-    np.testing.assert_allclose(in_plant.pose(own).GetAsMatrix4(), home, rtol=0, atol=SAME_MOTION)
-    blocks.set_at_equilibrium(context, robot.home.transform())
+    context = builder.Build().CreateDefaultContext()
+    own, home = plant.GetMyMutableContextFromRoot(context), robot.home.transform()
+    found = in_plant.pose(own).GetAsMatrix4()
+    np.testing.assert_allclose(found, home.GetAsMatrix4(), rtol=0, atol=SAME_MOTION)
+    blocks.set_at_equilibrium(context, home)
+    away = home.translation() + np.array([0.01, 0.02, -0.03])
+    in_plant.set_pose(own, RigidTransform(home.rotation(), away))
     plant.SetVelocities(own, in_plant.model_instance, [0.1, 0.2, -0.3, 0.05, -0.1, 0.02])
-    blocks.GetInputPort("cable_velocities").FixValue(
-        blocks.winches.GetMyMutableContextFromRoot(context), np.zeros(len(robot.cables))
-    )
-    simulator = Simulator(diagram, context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", 2e-4)
-    simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    simulator.AdvanceTo(0.05)
-    return in_plant.pose(own).GetAsMatrix4()
+    winches = blocks.winches.GetMyMutableContextFromRoot(context)
+    blocks.GetInputPort("cable_velocities").FixValue(winches, np.zeros(len(robot.cables)))
+    acceleration = plant.get_generalized_acceleration_output_port(in_plant.model_instance)
+    return acceleration.Eval(own)
 
 
 def test_a_robot_that_directives_added_moves_as_one_of_ours(tmp_path):
@@ -215,8 +204,10 @@ def test_a_robot_that_directives_added_moves_as_one_of_ours(tmp_path):
         plant.Finalize()
         return in_plant
 
-    theirs = moved(lambda plant, robot: find_robot(packed(plant, tmp_path), robot))
-    np.testing.assert_allclose(theirs, moved(ours), rtol=0, atol=SAME_MOTION)
+    theirs = rates(lambda plant, robot: find_robot(packed(plant, tmp_path), robot))
+    size = np.max(np.abs(theirs))
+    assert size > 10.0
+    np.testing.assert_allclose(theirs, rates(ours), rtol=0, atol=SAME_MOTION * size)
 
 
 def test_what_is_no_such_robot_is_said(tmp_path):
@@ -262,3 +253,92 @@ def test_an_exported_urdf_is_one_tree_with_a_free_platform_at_home(tmp_path):
     q = X_WP.rotation().ToQuaternion().wxyz()
     np.testing.assert_allclose(model.qpos0, [*X_WP.translation(), *q], atol=SAME_MOTION)
     assert model.body("platform").mass == pytest.approx(robot.platform.mass)
+
+
+# Machines as firmwares of printers and routers know them, by the laws of these firmwares.
+
+BUILT_UP = (
+    REPRAP.replace("Q0.0", "Q0.0356")
+    .replace("U2:2:2:2", "U2:2:2:4")
+    .replace("R65.0:65.0:65.0:65.0", "R65.24:65.14:65.3:64.67")
+)
+R, ADVANTAGE = [65.24, 65.14, 65.3, 64.67], np.array([2.0, 2.0, 2.0, 4.0])
+
+
+@pytest.fixture
+def load(tmp_path):
+    return lambda name, text: load_robot(str(saved(name, text)(tmp_path)))
+
+
+@pytest.fixture
+def again(load):
+    """A robot that went out to a format and in again, and the text."""
+
+    def exported(robot, format):
+        ((name, text),) = export_robot(robot, format).items()
+        return load(f"again_{name}", text), text
+
+    return exported
+
+
+def test_motors_turn_as_far_as_the_firmware_turns_them(load, again):
+    """Drums, tackles and build-up against HangprinterKinematics.cpp's k0, k1, k2 [mm]."""
+    robot = load("config.g", BUILT_UP)
+    assert [cable.mechanical_advantage for cable in robot.cables] == ADVANTAGE.tolist()
+    np.testing.assert_allclose(robot.stiffness(), 20000.0)
+    origin, Q = np.linalg.norm(robot.exit_points(), axis=0), 0.0356
+    k2 = -ADVANTAGE * Q
+    k1 = np.square(R) + Q * ADVANTAGE * 1e3 * origin
+    k0 = 2.0 * ADVANTAGE * 12.75 / k2
+    other, text = again(robot, "reprapfirmware")
+    for point in ([0.2, -0.3, 0.5], [-0.4, 0.1, 1.2], [0.6, 0.7, 0.1]):
+        lengths = np.linalg.norm(robot.exit_points().T - point, axis=1)
+        firmware = k0 * (np.sqrt(k1 + 1e3 * lengths * k2) - np.sqrt(k1 + 1e3 * origin * k2))
+        for drum in (robot.drum(), other.drum()):
+            np.testing.assert_allclose(drum.motor_angles(lengths - origin), firmware, rtol=1e-9)
+    numbers = re.search(r"M666 Q(\S+) R(\S+) U(\S+)", text)
+    assert float(numbers[1]) == pytest.approx(Q, rel=1e-12)
+    radii = [float(each) for each in numbers[2].split(":")]
+    np.testing.assert_allclose(radii, R, rtol=1e-12)
+    assert numbers[3] == "2:2:2:4"
+    np.testing.assert_allclose(other.drum().radii(4), robot.drum().radii(4), rtol=1e-12)
+    assert other.winch.layers.wound == pytest.approx(robot.winch.layers.wound)
+
+
+def test_the_drums_of_the_catalogue_are_read_back(again):
+    catalogue = load_robot("hangprinter_4")
+    other, _ = again(catalogue, "reprapfirmware")
+    for paid_out in (np.zeros(4), np.full(4, 0.4), np.full(4, -0.7)):
+        found, expected = (r.drum().motor_angles(paid_out) for r in (other, catalogue))
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-12)
+
+
+SLED = """kinematics: {MaslowKinematics: {tlX: 0, tlY: 2000, tlZ: 100, trX: 3000, trY: 2000,
+  trZ: 56, blX: 0, blY: 0, blZ: 34, brX: 3000, brY: 0, brZ: 78, beltEndExtension: 30,
+  armLength: 123.4}}
+"""
+
+
+@pytest.mark.parametrize("upright", [False, True])
+def test_maslow_s_arms_stay_level(upright, load, again):
+    """By the firmware's formula: the distance in the board, less the arms, and the height."""
+    sled = load("sled.yaml", SLED + f"Maslow_vertical: {str(upright).lower()}\n")
+    assert sled.pulley.arm == pytest.approx(0.1534)
+    far, heights = np.hypot([0.5, 2.5, 0.5, 2.5], [0.4, 0.4, 1.6, 1.6]), [0.1, 0.056, 0.034, 0.078]
+    X_WP = RigidTransform([0.5, 0.0, 1.6] if upright else [0.5, 1.6, 0.0])
+    lengths = cable_paths(X_WP, sled.cable_set()).lengths
+    np.testing.assert_allclose(lengths, np.hypot(far - 0.1534, heights), rtol=1e-12)
+    assert 1e3 * lengths[0] == pytest.approx(497.08, abs=0.005)
+    other, _ = again(sled, "maslow")
+    np.testing.assert_allclose(cable_paths(X_WP, other.cable_set()).lengths, lengths, rtol=1e-12)
+
+
+def test_older_maslow_belts_go_straight_to_the_middle(load):
+    given = {"tlX": 0, "tlY": 2000, "trX": 3000, "trY": 2000, "brX": 3000, "brY": 0, "blY": 0}
+    given["armLength"] = 120
+    old = load("old.yaml", "".join(f"Maslow_{key}: {value}\n" for key, value in given.items()))
+    assert old.pulley.arm == 0.0
+
+
+def test_maslow_s_belt_is_as_stiff_as_its_makers_say():
+    assert load_robot("maslow_4").stiffness() == pytest.approx([178.9e3] * 4, rel=1e-5)

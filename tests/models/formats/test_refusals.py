@@ -56,7 +56,8 @@ TOGETHER = (
 )
 WHOLE = f'<joint type="SPATIAL_EULER_XYZ" q_initial="{words([0.2, -0.1, 1.1, 0.1, -0.2, 0.3])}"/>'
 MASS, PULLEY = '"mass": 2.5', toy(pulley=True)
-SETS = ('<cable_set id="first"/>', ""), ("cable_set ", "set "), ("cable_set>", "set>")
+FIRST = '<cable_set id="first"></cable_set>'
+SETS = (FIRST, ""), ("cable_set ", "set "), ("cable_set>", "set>")
 BALL = '<joint name="holds" type="ball"><parent>gantry</parent><child>platform</child></joint>'
 
 # name -> (what writes the file, changes of words in it, what the refusal says)
@@ -281,7 +282,7 @@ def test_a_mechanism_is_no_robot_with_one_platform(read, tmp_path):
     ("choice", "expected"),
     [
         ({"cable_set": "first"}, "cable_set first"),
-        ({"cable_set": "third"}, "default_cable_set: found third; accepted: one of f"),
+        ({"cable_set": "third"}, "default_cable_set: found third; accepted: one of s"),
     ],
 )
 def test_sets_of_cables_that_have_none(choice, expected, tmp_path):

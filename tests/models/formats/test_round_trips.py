@@ -11,12 +11,13 @@ import pytest
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, HELD, export_omissions
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.fields import text
 from tests.messages import printed
-from tests.models.formats.meanings import fields_that_differ, meaning, same, schema_keys
+from tests.models.formats.meanings import fields_that_differ, schema_keys
 from tests.models.formats.unusual_robots import (
     ALL,
     NAMES,
@@ -61,8 +62,10 @@ def back(robot, files, folder):
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_no_field_is_lost_unsaid(name, tmp_path):
+def test_no_field_is_lost_unsaid(name, tmp_path, monkeypatch):
     """And of unusual robots nothing is named that comes back."""
+    # Of a home pose that a format has not, others look at the search over 225 poses.
+    monkeypatch.setattr(assumptions, "_farthest", lambda *_: (0, 1.0))
     robot = made(name)
     for format in formats():
         again = back(robot, lambda format=format: exported(name, format), tmp_path)
@@ -176,15 +179,6 @@ def test_letters_that_xml_has_not_leave_a_file_that_is_read(format, tmp_path):
     again = models.load_robot(str(written(export_robot(robot, format), tmp_path)))
     assert again.title == "bell "
     assert {"title", "cables[].name"} <= set(export_omissions(robot, format))
-
-
-@pytest.mark.parametrize("format", ["caspr", "wcrfx"])
-def test_pulleys_of_all_cables_come_back(format, tmp_path):
-    robot = made("everything")
-    again = models.load_robot(str(written(exported("everything", format), tmp_path)))
-    for key in ("pulley.radius", "pulley.swivel_axis", "cables[].pulley_radius"):
-        assert same(meaning(key, robot, robot), meaning(key, again, robot))
-    assert again.cable_set().pulley_radius.tolist() == [0.017, *[0.031] * 5, 0.0, 0.031]
 
 
 def test_without_pulleys_nothing_is_said_of_them():

@@ -36,10 +36,11 @@ class Link:
         )
         return (
             f'<link_rigid num="{number}" name="{self.name}"><joint type="{self.joint}" '
-            f'q_initial="{self.q}" {self.more}/><physical><mass>{self.mass}</mass>'
-            f"<com_location>{self.com}</com_location><end_location>0 0 1</end_location>"
-            f'<inertia ref="{self.ref}">{moments}</inertia></physical><parent>'
-            f"<num>{self.parent}</num><location>{self.location}</location></parent></link_rigid>"
+            f'q_initial="{self.q}"{self.more and " "}{self.more}/>'
+            f"<physical><mass>{self.mass}</mass><com_location>{self.com}</com_location>"
+            f'<end_location>0 0 1</end_location><inertia ref="{self.ref}">{moments}</inertia>'
+            f"</physical><parent><num>{self.parent}</num><location>{self.location}</location></parent>"
+            "</link_rigid>"
         )
 
 
@@ -75,6 +76,8 @@ class Model:
     cables: list
     sets: dict = field(default_factory=dict)
     name: str = "toy"
+    default: str = "basic"
+    shown: str = "-1 1 -1 1 -1 1"
 
     def write(self, folder: Path) -> Path:
         """Writes its files; returns that of the bodies."""
@@ -82,16 +85,18 @@ class Model:
         bodies = folder / f"{self.name}_bodies.xml"
         bodies.write_text(
             '<?xml version="1.0" encoding="utf-8"?>\n<!DOCTYPE bodies_system SYSTEM "b.dtd">\n'
-            f'<bodies_system><links display_range="-1 1 -1 1 -1 1">{links}</links></bodies_system>',
+            f'<bodies_system><links display_range="{self.shown}">{links}</links></bodies_system>',
             encoding="utf-8",
         )
-        sets = {"basic": self.cables, **self.sets}
+        sets = {self.default: self.cables, **self.sets}
         words = "".join(
             f'<cable_set id="{name}">{"".join(cable.text() for cable in cables)}</cable_set>'
             for name, cables in sets.items()
         )
         (folder / f"{self.name}_cables.xml").write_text(
-            f'<cables default_cable_set="basic">{words}</cables>', encoding="utf-8"
+            "<!DOCTYPE cables [<!ATTLIST cable_set id ID #REQUIRED>]>"
+            f'<cables default_cable_set="{self.default}">{words}</cables>',
+            encoding="utf-8",
         )
         return bodies
 

@@ -19,7 +19,7 @@ from tests.systems.diagrams.diagram_cases import (
     dynamic_control,
     written,
 )
-from tests.systems.robots.test_bundles import parallelograms
+from tests.systems.robots.engines import parallelograms
 
 SLACK_START, TORQUE, PBVS = "acrobot_slack_start_tca", "acrobot_torque_servo", "acrobot_pbvs"
 MOVING = "target.motion={velocity: [0.01, 0, 0]}"

@@ -1,4 +1,4 @@
-"""Forces of cables and wrenches on a platform: balance, virtual work, slackness, Newton, rest."""
+"""Forces of cables and wrenches on a platform: balance, slackness, Newton, energy, derivatives."""
 
 from functools import cache
 
@@ -10,27 +10,31 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.analyses.statics.static_query import static_at_pose
+from cdpr_drake.cables.catenary_kernel import free_part, stored_energy
+from cdpr_drake.cables.elastic_law import elastic_energy
+from cdpr_drake.cables.hanging_kernel import solve_catenary
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.poses import pose_error, pose_from_angles
-from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.robot_in_plant import add_robot, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
+from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
+from cdpr_drake.systems.robots.cable_forces import CableForces
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step, holding_tensions
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.robots.settings import (
-    CableRobotSettings,
-    CableSettings,
-    DampingSettings,
-)
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
 from cdpr_drake.tensions.methods import exact_tensions
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
+from tests.models.robots import robot_of
+from tests.models.test_platform_pulleys import robot_content
 from tests.systems.robots.engines import (
+    ALL_BEHAVIOUR,
     BY_ENGINE,
     POSE,
+    behaving,
     fix_commands,
+    integrate,
+    linearized,
     moved,
     pose,
     put,
@@ -113,30 +117,6 @@ def test_a_default_context_hangs_at_home_in_balance(name):
     Simulator(block, context).AdvanceTo(0.002)
 
 
-@pytest.mark.parametrize("name", ["acrobot_small", "planar"])
-def test_the_force_does_the_work_of_the_tensions_and_poses_are_those_of_the_plant(name):
-    """Virtual work: the force on the plant's velocities is -J' t, also away from equilibrium."""
-    robot, block = load_robot(name), shared(name)
-    _, _, context = started(block, robot)
-    X_WP = moved(robot.home.transform(), np.array([0.0, 0.0, 0.002, 0.001, -0.002, 0.0]))
-    put(block, context, X_WP)
-    J = length_jacobian(X_WP, robot.exit_points(), robot.anchor_points())
-    expected = -J.T @ read(block, context, "tensions")
-    if robot.is_planar():
-        expected = expected[[3, 4, 2]]  # the joint's velocities are (x, y, theta)
-    cables = block.GetSubsystemByName("cables")
-    force = read(cables, cables.GetMyContextFromRoot(context), "generalized_force")
-    np.testing.assert_allclose(force, expected, rtol=1e-9, atol=BALANCE)
-    far = {
-        "acrobot_small": pose_from_angles(np.array([0.1, -0.2, 0.4]), np.array([0.3, -0.5, 2.0])),
-        "planar": pose_from_angles(np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, -2.5])),
-    }[name]
-    put(block, context, far)
-    assert max(pose_error(far, pose(block, context))) < ROUND_OFF
-    body = block.GetOutputPort("body_poses").Eval(context)[int(block.in_plant.body_index)]
-    assert max(pose_error(far, body)) < ROUND_OFF
-
-
 def lengthen(block, context, change):
     winches = block.GetSubsystemByName("winches")
     l0 = read(block, context, "unstrained_lengths") + change
@@ -208,28 +188,6 @@ def test_no_wrench_is_one_of_zeros_to_the_bit():
         simulator.AdvanceTo(0.05)
         states.append(read(block, context, "platform_state"))
     assert np.array_equal(*states)
-
-
-def test_the_platform_gives_as_its_stiffness_says():
-    """Half the difference of both signs leaves nothing of second order."""
-    robot = load_robot("acrobot_large")
-    how = CableRobotSettings(
-        cables=CableSettings(model="elastic"),
-        damping=DampingSettings(translation=2000.0, rotation=20.0),
-    )
-    small, poses = 1e-3 * WRENCH, []
-    for sign in (1.0, -1.0):
-        block, simulator, context = started(
-            CompiledCableRobot, robot, how, 2e-3, wrench=sign * small, method="semi_implicit"
-        )
-        simulator.AdvanceTo(4.0)
-        poses.append(read(block, context, "platform_state")[:7])
-    half = 0.5 * (poses[0] - poses[1])
-    found = np.concatenate([2.0 * half[1:4], half[4:]])
-    K = static_at_pose(robot, robot.home.transform(), "elastic", False).stiffness
-    expected = np.linalg.solve(K, small)
-    SHARE = 1e-6  # of the deflection: what is left of third order and of the way to rest
-    np.testing.assert_allclose(found, expected, atol=SHARE * np.abs(expected).max())
 
 
 def test_steps_get_shorter_as_the_platform_climbs_and_with_light_motors():
@@ -386,3 +344,198 @@ def test_an_anchor_point_in_a_groove_is_refused():
     bench.in_plant.set_pose(bench.plant_context, touching)
     with pytest.raises(CableGeometryError, match=r"at 0 s: cable 1: its anchor .* swivel axis"):
         bench.out("generalized_force")
+
+
+# Energy is kept where nothing takes it, else it is what winches put in.
+
+ENERGY_DRIFT = 1e-6
+"""Change of the total energy without damping, relative to the energy of the motion: what the motion
+has above the equilibrium that it swings about. Steps are 1/200 of the fastest period."""
+
+SWING = np.array([0.02, -0.015, 0.03, 0.002, 0.003, -0.003])
+"""Cables a thousand times softer stay taut; tensions swing by nearly what they are at rest."""
+
+
+def undamped(softer=1.0, heavier=1.0, robot=None):
+    """ACROBOT with the small platform, without damping, on softer cables, or heavier ones."""
+    robot = robot or load_robot("acrobot_small")
+    robot.cable.retardation_time = 0.0
+    robot.cable.youngs_modulus /= softer
+    robot.cable.linear_density *= heavier
+    return robot
+
+
+def energy(block, context):
+    """Kinetic, potential, and that of the cables: elastic, and their own weight where they sag."""
+    plant_context = block.plant.GetMyContextFromRoot(context)
+    total = block.plant.CalcKineticEnergy(plant_context)
+    total += block.plant.CalcPotentialEnergy(plant_context)
+    l0 = read(block, context, "unstrained_lengths")
+    cables = block.forces.cable_set()
+    if block.forces.model() != "catenary":
+        return total + elastic_energy(read(block, context, "lengths"), l0, cables.stiffness)
+    along = pose(block, context).multiply(cables.p_PB) - cables.p_WA
+    for i in range(8):
+        x, z = np.hypot(along[0, i], along[1, i]), along[2, i]
+        ES, w = cables.stiffness[i], cables.linear_weight[i]
+        H, V_A, good = solve_catenary(x, z, 0.0, 1.0, l0[i], ES, w, 0.0, 0.0)
+        assert good
+        *_, V, S, phi = free_part(H, V_A, l0[i], ES, w)
+        total += stored_energy(x, z, l0[i], ES, w, H, V, S, phi)
+    return total
+
+
+SOFT, HEAVY = undamped(1e3), undamped(1e3, heavier=20.0)
+SWINGS = {
+    "straight": (SOFT, "elastic", False, 5e-4, 0.5),
+    "pulleys": (SOFT, "elastic", True, 5e-4, 0.5),
+    "pulleys at the platform": (
+        undamped(200.0, robot=robot_of(robot_content())), "elastic", True, 2.5e-4, 0.25
+    ),
+    "catenary": (SOFT, "catenary", False, 5e-4, 0.5),
+    "heavy catenary": (HEAVY, "catenary", False, 5e-4, 0.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("swing", SWINGS)
+def test_undamped_cables_keep_the_energy(swing):
+    robot, model, pulleys, step, duration = SWINGS[swing]
+    how = settings_of(model=model, pulleys=pulleys)
+    block, simulator, context = started(CableRobot, robot, how, X_WP=POSE)
+    integrate(block, simulator, step, "runge_kutta5")
+    rest = energy(block, context)
+    put(block, context, moved(POSE, SWING))
+    start = energy(block, context)
+    for time in np.linspace(0.0, duration, 21)[1:]:
+        simulator.AdvanceTo(time)
+        assert abs(energy(block, context) - start) < ENERGY_DRIFT * (start - rest)
+        assert model == "catenary" or not np.any(read(block, context, "slack"))
+
+
+MOTOR_ENERGY = 1e-5
+"""Change of the energy with motors, relative to what the motors put in."""
+
+
+def test_platform_cables_and_motors_hold_what_the_torques_put_in():
+    """Stretched cable takes power t e / 2 per length onto the drum with it: dV/dl0 of an elastic
+    cable is -t (1 + e / 2), and the drum feels t."""
+    robot = undamped(softer=100.0)
+    robot.winch.friction = None
+    block, simulator, context = started(CableRobot, robot, settings_of("torque"), 2e-4)
+    rho = robot.winch_law().drum.length_per_angle(np.zeros(8))
+    torques = -rho * read(block, context, "drum_tensions")
+    torques *= np.array([1.3, 1.0, 0.9, 1.2, 1.0, 1.1, 0.8, 1.2])
+    block.GetInputPort("motor_torques").FixValue(context, torques)
+
+    def whole():
+        speeds = read(block, context, "motor_speeds")
+        total = energy(block, context) + 0.5 * robot.winch.inertia * np.sum(speeds**2)
+        return total - torques @ read(block, context, "motor_angles")
+
+    def wound_power():
+        strain = read(block, context, "lengths") / read(block, context, "unstrained_lengths") - 1.0
+        rates = read(block, context, "unstrained_length_rates")
+        return np.sum(0.5 * robot.stiffness() * np.maximum(strain, 0.0) ** 2 * rates)
+
+    start, angles, powers = whole(), read(block, context, "motor_angles"), [0.0]
+    for time in np.arange(1, 201) * 1e-3:
+        simulator.AdvanceTo(time)
+        powers.append(wound_power())
+    put_in = np.abs(torques) @ np.abs(read(block, context, "motor_angles") - angles)
+    assert put_in > 0.03
+    wound = np.trapezoid(powers, dx=1e-3)
+    assert abs(whole() + wound - start) < MOTOR_ENERGY * put_in
+
+
+# Derivatives by AutoDiffXd are those of differences, frequencies those of the stiffness.
+
+DERIVATIVES = 1e-6
+"""Central differences against AutoDiff, relative to the largest derivative."""
+
+ELASTIC = settings_of(model="elastic", pulleys=True)
+CATENARY = settings_of(model="catenary", pulleys=True)
+
+
+def creeping():
+    return behaving(load_robot("acrobot_small"), **ALL_BEHAVIOUR)
+
+
+def over_platform_pulleys():
+    return robot_of(robot_content())
+
+
+CASES = {
+    "straight": ("acrobot_small", settings_of(), POSE),
+    "elastic": ("acrobot_small", ELASTIC, POSE),
+    "catenary": ("acrobot_small", CATENARY, POSE),
+    "pulleys at the platform": (over_platform_pulleys, settings_of(pulleys=True), POSE),
+    "planar": ("planar", settings_of(), None),
+    "planar, elastic": ("planar", ELASTIC, None),
+    "planar, catenary": ("planar", CATENARY, None),
+    "behaving": (creeping, settings_of(pulleys=True), POSE),
+    "torque": ("acrobot_small", settings_of("torque"), None),
+    "velocity": ("acrobot_small", settings_of("velocity"), None),
+    "position": ("acrobot_small", settings_of("position"), None),
+    "motors and catenaries": ("acrobot_small", settings_of("velocity", "catenary", True), POSE),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_linearisation_is_the_derivative_of_differences(case):
+    name, how, X_WP = CASES[case]
+    robot = name() if callable(name) else load_robot(name)
+    block, _, context = started(CableRobot, robot, how, X_WP=X_WP)
+    x0 = context.get_continuous_state_vector().CopyToVector()
+    m, motors = len(robot.cables), how.winches.kind == "motor"
+    if motors:  # turning, so that friction is that of sliding
+        x0[13 + m : 13 + 2 * m] = np.linspace(-0.1, 0.12, m)
+        context.SetContinuousState(x0)
+    linear = linearized(block, context)
+    A, step = np.empty((len(x0), len(x0))), 1e-8
+    for j, e in enumerate(np.eye(len(x0))):
+        ends = []
+        for sign in (1.0, -1.0):
+            context.SetContinuousState(x0 + sign * step * e)
+            ends.append(block.EvalTimeDerivatives(context).CopyToVector())
+        A[:, j] = (ends[0] - ends[1]) / (2.0 * step)
+    np.testing.assert_allclose(linear.A(), A, rtol=0.0, atol=DERIVATIVES * np.max(np.abs(A)))
+    if not motors and case != "behaving":
+        # A winch that pays out changes its length at once, and the damping of its cable.
+        np.testing.assert_array_equal(linear.B()[-m:], np.eye(m))
+
+
+def test_a_robot_at_rest_on_motors_is_stable():
+    robot = load_robot("acrobot_small")
+    block, _, context = started(CableRobot, robot, CASES["motors and catenaries"][1], X_WP=POSE)
+    assert np.max(np.linalg.eigvals(linearized(block, context).A()).real) < 1e-3
+
+
+def test_frequencies_are_those_of_the_stiffness_matrix():
+    """Undamped: eigenvalues of the Diagram against stiffness and mass by their own formulas."""
+    robot = load_robot("acrobot_small")
+    block, _, context = started(CableRobot, robot, ELASTIC, X_WP=POSE)
+    values = np.linalg.eigvals(linearized(block, context).A())
+    platform, l0 = rigid_platform(robot), read(block, context, "unstrained_lengths")
+    K = platform_stiffness(robot.cable_set(), "elastic", platform, POSE, l0).total
+    expected = 2 * np.pi * natural_modes(K, platform, POSE).frequencies
+    np.testing.assert_allclose(np.sort(values.imag[values.imag > 1.0]), expected, rtol=1e-6)
+
+
+def test_forces_of_broken_cables_are_the_same_on_autodiff():
+    robot = load_robot("planar")
+    block, found, m = CableForces(CableRobot(robot).in_plant, breakable=True), [], 4
+    inputs = {
+        "platform_state": [0.01, 0.02, 0.03, 0.1, -0.2, 0.3],
+        "unstrained_lengths": np.full(m, 0.5),
+        "unstrained_length_rates": np.zeros(m),
+        "broken": (np.arange(m) == 1).astype(float),
+    }
+    for system in (block, block.ToAutoDiffXd()):
+        context = system.CreateDefaultContext()
+        for name, values in inputs.items():
+            system.GetInputPort(name).FixValue(context, np.array(values))
+        numbers = read(system, context, "generalized_force", "tensions")
+        found.append(np.array([getattr(x, "value", lambda x=x: x)() for x in numbers], float))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-12)
+    assert found[0][-m + 1] == 0.0
+    assert np.all(np.delete(found[0][-m:], 1) > 0.0)

@@ -1,30 +1,32 @@
-"""Contexts: default and random ones begin at rest, and every episode begins where the first did."""
+"""Contexts begin at rest, and episodes where the first did; names, forces, templates of blocks."""
 
+import inspect
 from functools import cache
 
 import gymnasium
 import numpy as np
 import pytest
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common import RandomGenerator
 from pydrake.geometry import SceneGraph
 from pydrake.gym import DrakeGymEnv
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.analysis import MonteCarloSimulation, Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem_
 from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.systems.scalar_conversion import TemplateSystem
 
-from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_copies import moved_robot
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.robots.assembly import add_cable_robot
+from cdpr_drake.systems.robots.assembly import RobotBlock, add_cable_robot, apply_force
+from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.random_pose import RandomPose
+from cdpr_drake.systems.robots.templates import class_for_floats
 from tests.systems.robots.engines import (
     BY_ENGINE,
-    ENGINES,
-    SAME_STEPS,
     behaving,
     fix_commands,
     integrate,
@@ -33,6 +35,7 @@ from tests.systems.robots.engines import (
     read,
     settings_of,
 )
+from tests.systems.robots.test_refusals import NAMED_BLOCKS, in_own_plant
 
 AT_REST = 1e-7
 """How far a platform at rest moves [m], by an integrator of accuracy 1e-4; one whose cables are
@@ -50,6 +53,10 @@ CASES = {
     "point on a plane": ("maslow_4", settings_of()),
     "too few cables": ("grab_three", settings_of()),
     "creeping": (behaving(load_robot("acrobot_small"), creep_stiffness=2.0), settings_of()),
+    "stiffening": (
+        behaving(load_robot("acrobot_large"), stiffening=2e-3, expansion=1.2e-5, warmer=15.0),
+        settings_of(),
+    ),
     "motors": ("acrobot_large", settings_of("velocity")),
 }
 
@@ -135,28 +142,15 @@ def test_two_robots_in_one_plant_begin_at_rest_where_the_plant_puts_them(step, s
 
 @BY_ENGINE
 @pytest.mark.parametrize("case", ["small", "motors", "planar", "point on a plane"])
-def test_monte_carlo_simulations_begin_at_rest_at_drawn_poses(case, kind):
+def test_drawn_poses_differ_and_are_at_rest(case, kind):
     block = kind(*CASES[case], random_pose=LEVEL)
-
-    def make_simulator(generator):
-        simulator = Simulator(block)
-        fix_commands(block, simulator.get_mutable_context())
-        return simulator
-
-    rows = {0.0: [], 0.05: []}
-    for final_time, found in rows.items():
-
-        def output(system, context, found=found):
-            found.append(pose_row(block.GetOutputPort("X_WP").Eval(context)))
-            return 0.0
-
-        MonteCarloSimulation(
-            make_simulator=make_simulator, output=output, final_time=final_time, num_samples=3,
-            generator=RandomGenerator(4),
-        )  # fmt: skip
-    start, end = np.array(rows[0.0]), np.array(rows[0.05])
-    np.testing.assert_allclose(end, start, atol=AT_REST)
-    assert np.max(np.ptp(start, axis=0)) > 5e-3
+    context, generator, places = block.CreateDefaultContext(), RandomGenerator(4), []
+    for _ in range(3):
+        context.SetTime(0.0)
+        block.SetRandomContext(context, generator)
+        assert moves(block, context) < AT_REST
+        places.append(place(block, context))
+    assert np.max(np.ptp(places, axis=0)) > 5e-3
 
 
 @BY_ENGINE
@@ -249,11 +243,6 @@ def test_every_episode_begins_where_the_first_did(kind, reset_handler):
         assert also == total
 
 
-def test_both_engines_give_the_same_episode():
-    plant, compiled = (episode(environment(kind))[0] for kind in ENGINES)
-    np.testing.assert_allclose(compiled, plant, atol=SAME_STEPS)
-
-
 @BY_ENGINE
 def test_episodes_of_one_step_follow_their_own_action(kind):
     """The compiled robot remembers what it reached; that is not another episode's."""
@@ -275,10 +264,100 @@ def test_a_robot_stays_where_it_is_when_the_time_is_set_back():
     simulator.AdvancePendingEvents()
     before = read(block, context, "platform_state")
     context.SetTime(0.0)
-    with pytest.raises(RuntimeError, match="set the time first"):
+    with pytest.raises(
+        RuntimeError, match=r"state is that of 0\.05 s.* stands at 0 s.*set the time first"
+    ):
         read(block, context, "platform_state")
     simulator.Initialize()
     assert read(block, context, "platform_state").tobytes() == before.tobytes()
     assert not read(block, context, "steps").any()
     simulator.AdvanceTo(0.05)
     assert read(block, context, "platform_state")[6] < before[6]
+
+
+# Blocks take names and add forces up.
+
+NAME = "acrobot_small"
+ROBOT = load_robot(NAME)
+
+
+@pytest.mark.parametrize("what", NAMED_BLOCKS)
+def test_blocks_take_a_name_in_place_of_a_robot(what):
+    NAMED_BLOCKS[what](NAME)
+
+
+def test_robot_blocks_are_told_by_their_protocol():
+    for block in (CableRobot(NAME), CompiledCableRobot(NAME), add_cable_robot(*in_own_plant())):
+        assert isinstance(block, RobotBlock)
+    assert not isinstance(MultibodyPlant(0.0), RobotBlock)
+
+
+@pytest.mark.parametrize("after", [False, True])
+def test_own_generalized_forces_add_up_before_and_after(after):
+    """Half of the weight is carried, so that the platform rises with the tensions of all of it."""
+    builder, in_plant = in_own_plant()
+    plant, lift = in_plant.plant, np.zeros(6)
+    lift[5] = 0.5 * ROBOT.platform.mass * ROBOT.gravity
+    force = builder.AddSystem(ConstantVectorSource(lift))
+    if not after:
+        port = plant.get_applied_generalized_force_input_port()
+        builder.Connect(force.get_output_port(), port)
+    block = add_cable_robot(builder, in_plant)
+    if after:
+        apply_force(builder, plant, force.get_output_port(), name="lift")
+    still = builder.AddSystem(ConstantVectorSource(np.zeros(8)))
+    builder.Connect(still.get_output_port(), block.GetInputPort("cable_velocities"))
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    own = plant.GetMyContextFromRoot(context)
+    acceleration = plant.get_generalized_acceleration_output_port().Eval(own)
+    assert acceleration[5] == pytest.approx(0.5 * ROBOT.gravity, rel=1e-6)
+    Simulator(diagram, context).AdvanceTo(0.002)
+
+
+DEEP = 60
+"""Calls upon calls, as in an import."""
+
+
+class Scope:
+    __name__ = "somewhere"
+
+
+def template(base):
+    @TemplateSystem.define("Nothing_", T_list=(float, AutoDiffXd), scope=Scope())
+    def Nothing_(T):
+        class Impl(base[T]):
+            def _construct(self, converter=None):
+                LeafSystem_[T].__init__(self, converter=converter)
+
+            def _construct_copy(self, other, converter=None):
+                Impl._construct(self, converter=converter)
+
+        return Impl
+
+    return Nothing_
+
+
+def deeply(function, depth=DEEP):
+    return deeply(function, depth - 1) if depth else function()
+
+
+def test_drake_looks_through_a_short_stack_only(monkeypatch):
+    frames, stack = [], inspect.stack
+
+    def counted(*arguments):
+        found = stack(*arguments)
+        frames.append(len(found))
+        return found
+
+    monkeypatch.setattr(inspect, "stack", counted)
+    nothing = template(LeafSystem_)
+    made = deeply(lambda: class_for_floats(nothing))
+    assert made is nothing[float]
+    assert made().ToAutoDiffXd().num_output_ports() == 0
+    assert max(frames, default=0) < DEEP // 2
+
+
+def test_what_goes_wrong_in_a_template_is_said():
+    with pytest.raises(RuntimeError, match="must inherit from"):
+        class_for_floats(template({float: object, AutoDiffXd: object}))

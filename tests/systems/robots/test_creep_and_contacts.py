@@ -23,13 +23,11 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium_kernel import energy_at
-from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.cable_forces import CREPT
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.platform_hysteresis import BENT
-from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
+from cdpr_drake.systems.robots.settings import CableSettings
 from tests.motion.small_robots import small_robot
 from tests.systems.robots.engines import (
     ALL_BEHAVIOUR,
@@ -151,14 +149,6 @@ def test_derivatives_are_those_of_differences():
         by_pose = (state(step, 0.0).wrench - state(-step, 0.0).wrench) / (2.0 * h)
         found = slopes.wrench_by_pose[:, 3 + axis]
         np.testing.assert_allclose(found, by_pose, atol=CLOSED_FORM * largest)
-
-
-def test_a_robot_hangs_where_its_own_law_holds_it():
-    robot = behaving(load_robot("acrobot_large"), stiffening=2e-3, expansion=1.2e-5, warmer=15.0)
-    block, simulator, context = started(CompiledCableRobot, robot)
-    before = read(block, context, "platform_state")
-    simulator.AdvanceTo(0.05)
-    np.testing.assert_allclose(read(block, context, "platform_state"), before, atol=1e-9)
 
 
 def test_nothing_of_it_leaves_the_law_and_the_cables_as_they_were():
@@ -334,14 +324,6 @@ def test_the_plant_is_differentiated_with_its_contacts():
     swings = np.abs(np.imag(np.linalg.eigvals(linear.A())))
     for pulsation in np.sqrt(K / INERTIA):
         assert np.min(np.abs(swings - pulsation)) < 1e-6 * pulsation
-
-
-def test_a_loop_without_a_diagram_begins_with_unbent_contacts():
-    robot = rubbing(load_robot("acrobot_small"), TILT, TURN, A)
-    motion = RobotMotion(robot, CableRobotSettings(), StepRule(max_step=1e-4))
-    state = motion.resting(robot.home.transform())
-    assert len(state) == 13 + 8 + 3
-    assert not state[-3:].any()
 
 
 def test_contacts_make_automatic_steps_shorter_and_none_leave_no_state():

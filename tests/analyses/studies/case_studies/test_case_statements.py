@@ -31,18 +31,19 @@ def run(name, outcome="converged", end=None, **metrics):
 
 
 @pytest.mark.parametrize(
-    ("errors", "expected"),
-    [((0.004, 0.0041), "not testable"), ((0.004, 0.012), "not confirmed")],
+    ("runs", "expected"),
+    [
+        ({"none": 0.004, "within": 0.0041}, "not testable"),  # below where runs end
+        ({"none": 0.004, "within": 0.012}, "not confirmed"),
+        ({"none": 0.001, "beyond": None}, "not testable"),  # one has nothing to compare with
+    ],
 )
-def test_an_accuracy_below_the_threshold_at_which_runs_end_confirms_nothing(errors, expected):
-    names = ("none", "within")
-    runs = [run(n, position_error_m=e) for n, e in zip(names, errors, strict=True)]
-    assert same_accuracy(names, "").judge(made_runs(runs)).verdict == expected
-
-
-def test_one_configuration_that_converges_has_nothing_to_compare():
-    runs = [run("none", position_error_m=0.001), run("beyond", "target_lost")]
-    assert same_accuracy(("none", "beyond"), "").judge(made_runs(runs)).verdict == "not testable"
+def test_an_accuracy_needs_two_that_converge_and_the_threshold_at_which_runs_end(runs, expected):
+    made = [
+        run(name, "target_lost") if error is None else run(name, position_error_m=error)
+        for name, error in runs.items()
+    ]
+    assert same_accuracy(tuple(runs), "").judge(made_runs(made)).verdict == expected
 
 
 @pytest.mark.parametrize(
@@ -61,84 +62,65 @@ def test_a_run_that_loses_its_target_does_not_converge_later(outcome, time, expe
     assert slower.judge(made_runs(runs)).verdict == expected
 
 
-MOVING_CASES = [
-    # Times of estimators 1, 4, 5, 6, 7; None lasts until the run is stopped.
-    ((192.0, 32.0, 48.0, 48.0, 64.0), "confirmed"),
-    ((192.0, 80.0, 90.0, 70.0, 60.0), "in part"),
-    ((None, 32.0, 48.0, 48.0, 64.0), "in part"),
-    ((None, None, None, None, None), "not confirmed"),
-    ((None, None, 48.0, 48.0, 64.0), "not confirmed"),
-    ((40.0, 32.0, 48.0, 48.0, 64.0), "not confirmed"),
-]
-
-
-@pytest.mark.parametrize(("times", "expected"), MOVING_CASES)
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        # Times of estimators 1, 4, 5, 6, 7; None lasts until the run is stopped.
+        ((192.0, 32.0, 48.0, 48.0, 64.0), "confirmed"),
+        ((192.0, 80.0, 90.0, 70.0, 60.0), "in part"),
+        ((None, 32.0, 48.0, 48.0, 64.0), "in part"),
+        ((None, None, None, None, None), "not confirmed"),
+        ((None, None, 48.0, 48.0, 64.0), "not confirmed"),
+        ((40.0, 32.0, 48.0, 48.0, 64.0), "not confirmed"),
+    ],
+)
 def test_lasting_until_the_end_of_the_run_is_no_order(times, expected):
     runs = [
-        run(
-            f"m_{key}",
-            "timeout" if time is None else "target_lost",
-            time_s=MOVING_TIME if time is None else time,
-        )
+        run(f"m_{key}", "target_lost" if time else "timeout", time_s=time or MOVING_TIME)
         for key, time in zip("14567", times, strict=True)
     ]
     assert moving.judge(made_runs(runs)).verdict == expected
+    assert max(12 * 16.0, 210.0) < MOVING_TIME  # twelve laps fit into it
 
 
-def test_twelve_laps_fit_into_the_run():
-    assert MOVING_TIME > 12 * 16.0
-    assert MOVING_TIME > 210.0
+ROWS = ("a", "ap", "c", "cp")
 
 
 def table_runs(scatter, offset):
     """Converged runs of all four rows of table 2.1, spread and shifted by given lengths [m]."""
     return [
         run(f"{prefix}_{key}", end=[offset + sign * scatter, 0.0, 0.0])
-        for prefix in ("a", "ap", "c", "cp")
+        for prefix in ROWS
         for key in "1234567"
         for sign in (-1.0, 1.0)
     ]
 
 
-@pytest.mark.parametrize(
-    ("scatter", "offset", "expected"),
-    [
-        (1e-3, 1.8e-3, "confirmed"),
-        (1e-3, 1e-4, "in part"),
-        (1e-5, 1e-5, "in part"),
-        (1e-2, 1e-2, "not confirmed"),
-    ],
-)
-def test_far_better_than_printed_is_no_confirmation(scatter, offset, expected):
-    assert repeatable.judge(made_runs(table_runs(scatter, offset))).verdict == expected
-
-
 def turned_runs(scatter, offset):
     """Converged runs of table 2.1 that end turned about x by given angles [deg]."""
-    goal = np.array([1.0, 0, 0, 0, 0, 0, 0])
-    found = []
-    for prefix in ("a", "ap", "c", "cp"):
-        for key in "1234567":
-            for sign in (-1.0, 1.0):
-                half = np.radians(offset + sign * scatter) / 2.0
-                one = run(f"{prefix}_{key}")
-                end = np.array([np.cos(half), np.sin(half), 0, 0, 0, 0, 0])
-                one.measured["camera_ends"] = np.array([end, goal])
-                found.append(one)
+    found = table_runs(0.0, 0.0)
+    for k, one in enumerate(found):
+        half = np.radians(offset + (2 * (k % 2) - 1) * scatter) / 2.0
+        end = np.array([np.cos(half), np.sin(half), 0, 0, 0, 0, 0])
+        one.measured["camera_ends"] = np.array([end, [1.0, 0, 0, 0, 0, 0, 0]])
     return found
 
 
 @pytest.mark.parametrize(
-    ("scatter", "offset", "expected"),
+    ("judge", "made", "scatter", "offset", "expected"),
     [
-        (0.3, 0.6, "confirmed"),
-        (0.3, 0.01, "in part"),
-        (1e-3, 1e-3, "in part"),
-        (3.0, 0.6, "not confirmed"),
+        (repeatable, table_runs, 1e-3, 1.8e-3, "confirmed"),
+        (repeatable, table_runs, 1e-3, 1e-4, "in part"),  # far better than printed
+        (repeatable, table_runs, 1e-5, 1e-5, "in part"),
+        (repeatable, table_runs, 1e-2, 1e-2, "not confirmed"),
+        (turns_repeat, turned_runs, 0.3, 0.6, "confirmed"),
+        (turns_repeat, turned_runs, 0.3, 0.01, "in part"),
+        (turns_repeat, turned_runs, 1e-3, 1e-3, "in part"),
+        (turns_repeat, turned_runs, 3.0, 0.6, "not confirmed"),
     ],
 )
-def test_rotations_of_table_2_1_are_judged_as_its_positions(scatter, offset, expected):
-    assert turns_repeat.judge(made_runs(turned_runs(scatter, offset))).verdict == expected
+def test_table_2_1_is_judged_by_scatter_and_offset(judge, made, scatter, offset, expected):
+    assert judge.judge(made_runs(made(scatter, offset))).verdict == expected
 
 
 def test_a_row_of_table_2_1_of_which_no_run_converged_is_not_met():

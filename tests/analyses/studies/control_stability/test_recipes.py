@@ -1,7 +1,5 @@
 """Variants of the recipe: what each changes, and that one command evaluates and continues one."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from dataclasses import replace
@@ -62,32 +60,27 @@ from cdpr_drake.stability.verdict import judge_stability
 from tests.messages import printed
 
 FULLY = "acrobot_fully_constrained"
-A11 = next(table for table in TABLES if table.name == "A.11")
+TABLE = {table.name: table for table in TABLES}
+A11 = TABLE["A.11"]
 
 
-def test_upper_on_upper_moves_cables_between_the_same_anchor_points():
-    before = PRESENT.cables(FULLY)
-    after = RECIPES["upper-on-upper"].cables(FULLY)
-    assert {*map(tuple, after.p_PB.T)} == {*map(tuple, before.p_PB.T)}
-    above = after.p_WA[2] > 1.0
-    np.testing.assert_array_equal(above, after.p_PB[2] > 0.05)
-    assert not np.any(above == (before.p_PB[2] > 0.05))  # by the numbers it is the other way round
-    np.testing.assert_array_equal(np.sign(after.p_PB[0]), np.sign(after.p_WA[0]))
-    np.testing.assert_array_equal(np.sign(after.p_PB[1]), -np.sign(after.p_WA[1]))
-    np.testing.assert_array_equal(after.p_WA, before.p_WA)
-
-
-def test_kept_cables_are_those_of_the_suspended_robot():
-    cables, before = RECIPES["kept-cables"].cables(FULLY), PRESENT.cables("acrobot_large")
-    one = {(*a[:2], *b) for a, b in zip(cables.p_WA.T, cables.p_PB.T, strict=True)}
-    assert one == {(*a[:2], *b) for a, b in zip(before.p_WA.T, before.p_PB.T, strict=True)}
-
-
-def test_other_corners_are_the_opposite_ones():
-    one, other = (
-        RECIPES[name].cables(FULLY).p_PB for name in ("upper-on-upper", "other-corners-independent")
+def test_arrangements_of_cables_are_what_they_are_called():
+    before, upper, other, kept = (
+        RECIPES[name].cables(FULLY)
+        for name in ("present", "upper-on-upper", "other-corners-independent", "kept-cables")
     )
-    np.testing.assert_array_equal(one * [[-1], [-1], [1]], other)
+    assert {*map(tuple, upper.p_PB.T)} == {*map(tuple, before.p_PB.T)}
+    above = upper.p_WA[2] > 1.0
+    np.testing.assert_array_equal(above, upper.p_PB[2] > 0.05)
+    assert not np.any(above == (before.p_PB[2] > 0.05))  # by the numbers it is the other way round
+    np.testing.assert_array_equal(np.sign(upper.p_PB[0]), np.sign(upper.p_WA[0]))
+    np.testing.assert_array_equal(np.sign(upper.p_PB[1]), -np.sign(upper.p_WA[1]))
+    np.testing.assert_array_equal(upper.p_WA, before.p_WA)
+    np.testing.assert_array_equal(upper.p_PB * [[-1], [-1], [1]], other.p_PB)  # opposite corners
+    large = PRESENT.cables("acrobot_large")
+    assert {(*a[:2], *b) for a, b in zip(kept.p_WA.T, kept.p_PB.T, strict=True)} == {
+        (*a[:2], *b) for a, b in zip(large.p_WA.T, large.p_PB.T, strict=True)
+    }
 
 
 def test_an_exchange_moves_two_cables_from_above_and_nothing_else():
@@ -162,10 +155,24 @@ def test_recipes_differ_in_what_they_name():
         )
         np.testing.assert_array_equal(one.cables.p_PB, other.cables.p_PB)
         assert recipe_bounds(table, "r_A", 0.1) == recipe_bounds(table, "r_A", 0.1, IN_USE)
-    assert recipe_bounds(A11, "r_A", 0.1, PRESENT).exits == "corners"
-    independent = RECIPES["upper-on-upper-independent"]
-    assert recipe_bounds(A11, "r_A", 0.1, independent).exits == "independent"
-    assert recipe_bounds(TABLES[1], "r_A", 0.1, independent).exits == "corners"
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "exits", "anchors"),
+    [
+        ("present", "A.11", "corners", None),
+        ("upper-on-upper-independent", "A.11", "independent", None),
+        ("upper-on-upper-independent", "A.9", "corners", None),
+        ("hybrid-exits-independent", "A.14", "independent", "corners"),
+        ("hybrid-exits-independent", "A.10", "corners", None),
+        ("caroca-single", "A.12", None, "single"),
+        ("caroca-single", "A.15", None, "common"),
+    ],
+)
+def test_points_of_a_scheme_and_bound_come_before_those_of_a_robot(name, table, exits, anchors):
+    for bound, kind, expected in (("r_A", "exits", exits), ("r_B", "anchors", anchors)):
+        found = getattr(recipe_bounds(TABLE[table], bound, 0.1, RECIPES[name]), kind)
+        assert expected in (None, found)
 
 
 def some_of(study, *asked, chunk=20):
@@ -237,18 +244,6 @@ def test_wrong_recipes_are_refused(capsys, tmp_path, monkeypatch, arguments, wor
     assert list(tmp_path.iterdir()) == []
 
 
-def test_points_of_a_scheme_and_bound_come_before_those_of_a_robot():
-    hybrid = RECIPES["hybrid-exits-independent"]
-    table = next(table for table in TABLES if table.name == "A.14")
-    assert recipe_bounds(table, "r_A", 0.1, hybrid).exits == "independent"
-    assert recipe_bounds(table, "r_B", 0.1, hybrid).anchors == "corners"
-    assert recipe_bounds(TABLES[2], "r_A", 0.1, hybrid).exits == "corners"
-    single = RECIPES["caroca-single"]
-    pbvs, other = (next(t for t in TABLES if t.name == name) for name in ("A.12", "A.15"))
-    assert recipe_bounds(pbvs, "r_B", 0.1, single).anchors == "single"
-    assert recipe_bounds(other, "r_B", 0.1, single).anchors == "common"
-
-
 def test_mounting_and_goal_of_a_recipe_are_those_of_its_case():
     case = recipe_case("acrobot_large", "pbvs", RECIPES["camera-as-built"])
     np.testing.assert_allclose(case.X_PC.translation(), [-0.0631, 0.0, 0.01])
@@ -307,7 +302,7 @@ def limit(table, bound, value, printed, at_most, arrangement="present"):
 
 
 def test_a_table_is_explained_by_bounds_that_are_ruled_out_and_by_nothing_else():
-    table = next(table for table in TABLES if table.name == "A.15")
+    table = TABLE["A.15"]
     [reason] = table_reasons(IN_USE, rows_of(table, {"r_A": 0.0, "r_B": 0.0}), Runs(()))
     assert set(reason.rows) == {"r_A"}  # from printed numbers alone
     assert not reason.explained

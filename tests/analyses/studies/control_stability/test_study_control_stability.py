@@ -1,17 +1,16 @@
-"""The studies of stability: published numbers, the recipe, and that they run, stop and write."""
-
-from __future__ import annotations
+"""The studies of stability: published numbers, recipe, judges; that they run, stop and write."""
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.benchmarks.stability import plain_pairs
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import IN_PART, NOT_CONFIRMED, NOT_IN_QUICK
 from cdpr_drake.analyses.studies.control_stability import study as module
+from cdpr_drake.analyses.studies.control_stability.statements import CHECKS
 from cdpr_drake.analyses.studies.control_stability.study import STUDY
 from cdpr_drake.analyses.studies.control_stability.tables import (
     SHARE,
@@ -20,8 +19,10 @@ from cdpr_drake.analyses.studies.control_stability.tables import (
     stability_tables,
 )
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.study import Study, StudyResult
-from cdpr_drake.analyses.studies.framework.summary import FULL
+from cdpr_drake.analyses.studies.framework.statement import MET_FITTED, SOURCE, judged
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
+from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
 from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_bounds,
     recipe_case,
@@ -40,7 +41,7 @@ POINTS = 4.0
 the means over whole tables are smaller."""
 
 
-def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
+def share(table_name, bound, value):
     """Computed and published share [%]."""
     table = next(table for table in TABLES if table.name == table_name)
     grid = recipe_grid(table.robot)
@@ -74,17 +75,17 @@ def share(table_name: str, bound: str, value: float) -> tuple[float, float]:
         ("A.14", "r_A", 0.1),
     ],
 )
-def test_recipe_meets_published_rows(table: str, bound: str, value: float) -> None:
+def test_recipe_meets_published_rows(table, bound, value):
     computed, published = share(table, bound, value)
     assert computed == pytest.approx(published, abs=POINTS)
 
 
-def test_negative_bounds_are_refused() -> None:
+def test_negative_bounds_are_refused():
     with pytest.raises(StabilityError, match="r_A: found -1"):
         single_bounds(PerturbationBounds(), "r_A", -1.0)
 
 
-def test_plain_loop_agrees_with_the_kernel() -> None:
+def test_plain_loop_agrees_with_the_kernel():
     case = recipe_case("acrobot_large", "pbvs")
     poses = recipe_grid("acrobot_large", quick=True).pose_rows()[::7]
     found = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
@@ -92,7 +93,7 @@ def test_plain_loop_agrees_with_the_kernel() -> None:
     assert 0 < np.sum(found) < len(poses)
 
 
-def test_tables_say_which_rows_they_cover_and_average_all_of_them_first() -> None:
+def test_tables_say_which_rows_they_cover_and_average_all_of_them_first():
     table = next(table for table in TABLES if table.name == "A.12")
     rows = [
         Run(
@@ -116,25 +117,34 @@ def test_tables_say_which_rows_they_cover_and_average_all_of_them_first() -> Non
     assert "d_theta_pc of 30 deg and more" in str(summary.caption)
 
 
-def of_tables(*names: str) -> Study:
+ASKED = (SHARE, "r_bp", "r_B")
+"""What is asked of a small study: what is covered, and two of the bounds."""
+
+
+def of_tables(*names):
     """The study of some tables."""
-    some = [table for table in TABLES if table.name in names]
-    return replace(
-        STUDY, cases=lambda form: [one for t in some for one in module.table_cases(t, form)]
-    )
+
+    def cases(form):
+        some = [table for table in TABLES if table.name in names]
+        found = [one for table in some for one in module.table_cases(table, form)]
+        found = [one for one in found if one.keys["bound"] in ASKED]
+        there = {one.name for one in found}
+        return [one for one in found if one.same_task in ("", *there)]
+
+    return replace(STUDY, cases=cases)
 
 
 SMALL = of_tables("A.8", "A.18")
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
+def whole(tmp_path_factory):
     """The study from beginning to end."""
     folder = tmp_path_factory.mktemp("whole") / "s"
     return SMALL(True, StudySession(folder=folder, workers=1))
 
 
-def test_control_stability_orders_stops_and_writes(whole: StudyResult, tmp_path: Path) -> None:
+def test_control_stability_orders_stops_and_writes(whole, tmp_path):
     assert not whole.interrupted
     assert set(whole.runs.counts("table")) == {"A.8", "A.18"}
     assert all(whole.runs["ordered"])
@@ -161,12 +171,10 @@ def test_control_stability_orders_stops_and_writes(whole: StudyResult, tmp_path:
     assert stopped.statements == []
 
 
-def test_a_stopped_study_continues_with_the_same_numbers(
-    whole: StudyResult, tmp_path: Path
-) -> None:
+def test_a_stopped_study_continues_with_the_same_numbers(whole, tmp_path):
     study = replace(of_tables("A.8"), chunk=60)  # several chunks per row
     rows = whole.runs(table="A.8").rows
-    reports: list[WorkProgress] = []
+    reports = []
     stop = StudySession(
         tmp_path / "s", reports.append, lambda: 2 * reports[-1].done > reports[-1].total, 1
     )
@@ -180,10 +188,8 @@ def test_a_stopped_study_continues_with_the_same_numbers(
     assert second.runs.rows == list(rows)
 
 
-def test_a_folder_of_another_recipe_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def stopped() -> None:
+def test_a_folder_of_another_recipe_is_refused(tmp_path, monkeypatch):
+    def stopped():
         SMALL(True, StudySession(folder=tmp_path / "s", should_stop=lambda: True))
 
     stopped()
@@ -201,3 +207,89 @@ def test_a_folder_of_another_recipe_is_refused(
             stopped()
     with pytest.raises(OutputFolderError, match="quick is true there, false here"):
         SMALL(False, StudySession(folder=tmp_path / "s", should_stop=lambda: True))
+
+
+PLANNED = STUDY.planned(Form())
+
+
+def printed_rows(change=lambda share: share, grid=FULL):
+    """Rows in which every printed share is found, or something else in its place."""
+    rows = [
+        Run(
+            f"{table.name} {bound}={value:g}", None,
+            {"table": table.name, "bound": bound, "value": value, "grid": grid},
+            {"sampled_percent": change(share)}, {"sampled_percent": f"{share:g}"},
+        )
+        for table in TABLES
+        for bound, values in table.rows.items()
+        for value, share in values.items()
+    ]  # fmt: skip
+    return Runs(rows, lambda: PLANNED)
+
+
+def test_printed_numbers_confirm_all_but_what_a_table_contradicts():
+    said = {s.name: s for s in judged(CHECKS, printed_rows())}
+    assert len(said) == len(CHECKS) == len(TABLES) + 6
+    assert {name for name, s in said.items() if s.verdict != MET_FITTED} == {"anchors_more"}
+    assert said["anchors_more"].verdict == IN_PART
+    assert "0.394, 0.295, 0.113 m^3" in said["image_based_largest"].found
+
+
+def test_numbers_upside_down_confirm_no_table():
+    rows = printed_rows(lambda share: (share + 50.0) % 100.0)
+    said = {s.name: s for s in judged(CHECKS, rows)}
+    tables = [one for name, one in said.items() if name.startswith("table_")]
+    assert {one.verdict for one in tables} == {NOT_CONFIRMED}
+
+
+def test_rows_that_are_not_there_are_no_confirmation():
+    runs = printed_rows()
+    some = [run for run in runs if run["table"] == "A.8" and run["bound"] != "r_s"]
+    assert judged(CHECKS, Runs(some, runs.planned), complete=False) == []
+
+
+def test_no_effect_of_any_error_meets_no_table_not_even_in_part():
+    # Every row as at the baseline: rows of errors that the thesis finds harmless are met by that.
+    rows = [
+        replace(run, measured={"sampled_percent": next(iter(table.rows[run["bound"]].values()))})
+        for table in TABLES
+        for run in printed_rows()
+        if run["table"] == table.name
+    ]
+    said = {s.name: s for s in judged(CHECKS, Runs(rows, lambda: PLANNED))}
+    tables = [one for name, one in said.items() if name.startswith("table_")]
+    assert {one.verdict for one in tables} == {NOT_CONFIRMED}
+    assert {(one.of, one.cause) for one in tables} == {(1, SOURCE)}
+
+
+def test_that_bounds_were_tested_farther_on_the_larger_robot_is_no_finding():
+    # Nothing empties any workspace, and the larger robot keeps no more than the small one.
+    said = {s.name: s for s in judged(CHECKS, printed_rows(lambda share: 50.0))}
+    assert said["scales"].verdict == NOT_CONFIRMED
+    assert said["scales"].of == 9
+
+
+def test_coarse_grids_are_not_judged_but_named():
+    said = judged(CHECKS, printed_rows(grid=COARSE), quick=True)
+    assert {s.verdict for s in said} == {NOT_IN_QUICK}
+    assert said[0].words.startswith("Table A.8")
+    assert said[0].name == "table_a8"
+
+
+def test_the_full_form_has_every_printed_row_and_what_is_covered():
+    cases = STUDY.plan(Form())
+    printed = [case for case in cases if case.printed]
+    assert len(printed) == sum(table.size for table in TABLES) == 468
+    assert {case.keys["bound"] for case in cases if not case.printed} == {SHARE}
+    alike = [case for case in cases if case.same_task]
+    assert 0 < len(alike) < len(cases) / 2
+
+
+def test_which_rows_the_recipe_was_chosen_on():
+    assert chosen_on("A.10", "r_A", 0.1)
+    assert chosen_on("A.15", "r_bp", 1.0)
+    assert chosen_on("A.11", "r_bp", 0.03)
+    assert chosen_on("A.11", "r_A", 0.1)
+    assert chosen_on("A.11", "r_bp", 0.1)
+    assert not chosen_on("A.16", "r_bp", 0.1)
+    assert not chosen_on("A.13", "d_theta_pc_deg", 40.0)

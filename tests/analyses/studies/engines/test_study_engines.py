@@ -7,24 +7,11 @@ import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.engines.pairs import (
-    ENERGY_STEPS,
-    METHODS,
-    ORDERS,
-    order_of,
-    run_pair,
-    slack_override,
-    taut_row,
-)
-from cdpr_drake.analyses.studies.engines.study import (
-    QUICK_DURATION,
-    QUICK_MOTIONS,
-    QUICK_RUNS,
-    QUICK_SCENARIOS,
-    STUDY,
-    measure,
-)
+from cdpr_drake.analyses.studies.engines import pairs
+from cdpr_drake.analyses.studies.engines import study as module
+from cdpr_drake.analyses.studies.engines.study import STUDY, measure
 from cdpr_drake.analyses.studies.framework.study import Form
+from tests.analyses.studies.made_up_studies import made, verdicts
 
 PAIR = {
     "outcome_plant": "converged", "outcome_compiled": "converged", "time_plant_s": 1.0,
@@ -56,8 +43,8 @@ def order_row(case, ratio):
     errors = (ratio ** np.arange(5)).tolist()
     return {
         "steps_s": case.data.steps(),
-        "distances_m": dict.fromkeys(METHODS, errors),
-        "orders": dict.fromkeys(METHODS, order_of(errors)),
+        "distances_m": dict.fromkeys(pairs.METHODS, errors),
+        "orders": dict.fromkeys(pairs.METHODS, pairs.order_of(errors)),
     }
 
 
@@ -78,16 +65,10 @@ def parted(case, seed):
     )
 
 
-def study(measure, quick=True, **session):
-    return replace(STUDY, measure=measure)(quick, StudySession(workers=1, **session))
-
-
 @pytest.mark.parametrize(("measure", "verdict"), [(same, CONFIRMED), (parted, NOT_CONFIRMED)])
 def test_engines_that_part_are_told_so(measure, verdict, tmp_path):
-    found = study(measure)
-    assert {one.name: one.verdict for one in found.statements} == dict.fromkeys(
-        STUDY.names_of_checks(), verdict
-    )
+    found = made(STUDY, measure)
+    assert verdicts(found) == dict.fromkeys(STUDY.names_of_checks(), verdict)
     assert found.write(tmp_path) == {}
     assert (tmp_path / "engines.png").exists()
     assert [len(table.columns) for table in found.tables()] == [10, 5]
@@ -97,24 +78,27 @@ def test_engines_that_part_are_told_so(measure, verdict, tmp_path):
     "worse", [{"time_compiled_s": 1.1}, {"final_error_compiled_m": 1e-4}, {"slack_share": 1.0}]
 )
 def test_each_part_of_what_ships_counts(worse):
-    found = study(lambda case, seed: same(case, seed) | worse)
+    found = made(STUDY, lambda case, seed: same(case, seed) | worse)
     (shipped,) = [one for one in found.statements if one.name == "shipped"]
     assert (shipped.verdict == CONFIRMED) == ("slack_share" in worse)
-    assert shipped.of == len(QUICK_SCENARIOS)
+    assert shipped.of == len(module.QUICK_SCENARIOS)
 
 
-def test_it_runs_what_the_form_says():
-    quick = study(same).runs.counts("kind")
+def test_it_runs_what_the_form_says(monkeypatch):
+    quick = made(STUDY, same).runs.counts("kind")
     assert quick == {
-        "scenario": len(QUICK_SCENARIOS), "taut": QUICK_MOTIONS, "order": len(ORDERS),
-        "energy": len(ENERGY_STEPS), "impacts": QUICK_RUNS,
+        "scenario": len(module.QUICK_SCENARIOS), "taut": module.QUICK_MOTIONS,
+        "order": len(pairs.ORDERS), "energy": len(pairs.ENERGY_STEPS),
+        "impacts": module.QUICK_RUNS,
     }  # fmt: skip
-    assert study(same, seeds=4).runs.counts("kind") == quick | {"taut": 4, "impacts": 4}
+    assert made(STUDY, same, seeds=4).runs.counts("kind") == quick | {"taut": 4, "impacts": 4}
+    monkeypatch.setattr(module, "robot_scenario_names", lambda: ("planar_pbvs", "acrobot_pbvs"))
     full = {case.name: case for case in STUDY.plan(Form())}
+    assert "scenario planar_pbvs" in full
     assert STUDY.count(full["impacts"], Form()) == 200
     assert STUDY.count(full["taut motions"], Form()) == 30
     assert STUDY.count(full["energy 0.0001 s"], Form()) == 1
-    assert f"duration={QUICK_DURATION}" not in full["scenario acrobot_pbvs"].changes
+    assert f"duration={module.QUICK_DURATION}" not in full["scenario acrobot_pbvs"].changes
 
 
 def test_methods_have_their_orders_and_taut_motions_agree():
@@ -122,10 +106,8 @@ def test_methods_have_their_orders_and_taut_motions_agree():
     scenario = replace(plan["scenario acrobot_pbvs"], changes=("duration=0.1",))
     cases = [plan["order taut"], replace(plan["taut motions"], most=1), scenario]
     found = replace(STUDY, cases=lambda form: cases, checks=STUDY.checks[:2] + STUDY.checks[3:4])
-    result = found(True, StudySession(workers=1))
-    assert {one.name: one.verdict for one in result.statements} == {
-        "taut": CONFIRMED, "shipped": CONFIRMED, "orders": CONFIRMED,
-    }  # fmt: skip
+    result = verdicts(found(True, StudySession(workers=1)))
+    assert result == dict.fromkeys(("taut", "shipped", "orders"), CONFIRMED)
 
 
 def test_energies_of_a_short_fall():
@@ -136,13 +118,14 @@ def test_energies_of_a_short_fall():
 
 
 def test_an_order_is_that_of_a_power():
-    steps = np.array(ORDERS["taut"].steps())
-    np.testing.assert_allclose([order_of(steps**p) for p in (1.0, 2.0, 3.0)], [1.0, 2.0, 3.0])
+    steps = np.array(pairs.ORDERS["taut"].steps())
+    np.testing.assert_allclose([pairs.order_of(steps**p) for p in (1.0, 2.0, 3.0)], [1.0, 2.0, 3.0])
 
 
-def test_a_row_does_not_depend_on_the_others():
-    assert taut_row(1) == taut_row(1) != taut_row(0)
-    assert slack_override(3) == slack_override(3) != slack_override(4)
-    pair = run_pair("planar_pbvs", ["duration=0.1"])
+def test_a_row_does_not_depend_on_the_others(monkeypatch):
+    monkeypatch.setattr(pairs, "TAUT_DURATION", 1.0)
+    assert pairs.taut_row(1) == pairs.taut_row(1) != pairs.taut_row(0)
+    assert pairs.slack_override(3) == pairs.slack_override(3) != pairs.slack_override(4)
+    pair = pairs.run_pair("planar_pbvs", ["duration=0.1"])
     assert pair["outcome_plant"] == pair["outcome_compiled"] == "timeout"
     assert set(pair) == set(PAIR)

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.studies.framework.runs import (
     MissingRuns,
     Run,
@@ -29,7 +30,7 @@ from cdpr_drake.analyses.studies.framework.statement import (
     statement,
 )
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
-from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
+from cdpr_drake.analyses.studies.framework.summary import Cell, Summary, note_coarse
 from cdpr_drake.errors import OutputFolderError
 
 FACTORS = {"small": 1.0, "large": 10.0, "few": 3.0}
@@ -131,6 +132,22 @@ def run(quick=False, session=LOCAL, **changes):
     return replace(STUDY, **changes)(quick, session)
 
 
+def stopped(after, folder=None, **changes):
+    """The full form, told to stop when it has asked so often whether it shall."""
+    asked = iter([False] * after + [True] * 100)
+    return run(session=replace(LOCAL, folder=folder, should_stop=lambda: next(asked)), **changes)
+
+
+@pytest.fixture(scope="module")
+def full():
+    return run()
+
+
+@pytest.fixture(scope="module")
+def quick():
+    return run(quick=True)
+
+
 def test_rows_keep_their_bits():
     row = measure(Case(name="x", data=1.0 / 3.0), 2)
     back = unpack_row(pack_row(row))
@@ -152,18 +169,17 @@ def test_units_are_in_names(column, unit):
     assert unit_of(column) == unit
 
 
-def test_cases_are_measured_as_often_as_the_form_says():
-    assert len(run().runs) == 3 + 3 + 1 + 2
-    assert len(run(quick=True).runs) == 1 + 1 + 2
+def test_cases_are_measured_as_often_as_the_form_says(full, quick):
+    assert len(full.runs) == 3 + 3 + 1 + 2
+    assert len(quick.runs) == 1 + 1 + 2
     seeds = run(session=replace(LOCAL, seeds=2)).runs
     assert [seeds.counts("size")[name] for name in FACTORS] == [2, 2, 1]
 
 
-def test_a_case_over_items_is_reduced_to_a_row_and_its_task_done_once():
-    found = run()
-    assert set(found.finished) & {"sum", "end"} == {"sum"}
-    assert found.runs.one(size="sum")["value"] == sum(k**2 for k in range(10))
-    assert found.runs.one(size="end")["value"] == 81.0
+def test_a_case_over_items_is_reduced_to_a_row_and_its_task_done_once(full):
+    assert set(full.finished) & {"sum", "end"} == {"sum"}
+    assert full.runs.one(size="sum")["value"] == sum(k**2 for k in range(10))
+    assert full.runs.one(size="end")["value"] == 81.0
 
 
 def test_a_task_may_tell_what_its_numbers_depend_on():
@@ -178,8 +194,8 @@ def test_a_task_may_tell_what_its_numbers_depend_on():
     assert case.arguments() == {"task": {"squares": "of items"}, "items": 2}
 
 
-def test_runs_are_picked_and_reduced():
-    runs = run().runs(kind="seeded")
+def test_runs_are_picked_and_reduced(full):
+    runs = full.runs(kind="seeded")
     assert runs.largest("peak_m", size=("small", "large")) == 1.0 + 2.0 / 3.0
     assert runs(size="small", lost=True).list("seed") == [1]
     assert runs.counted("outcome", size="small") == "2 arrived, 1 lost"
@@ -190,22 +206,21 @@ def test_runs_are_picked_and_reduced():
     assert {size: len(some) for size, some in runs.by("size")} == {"small": 3, "large": 3, "few": 1}
 
 
-def test_means_by_the_values_of_a_key():
-    runs = run().runs
-    means = runs.means("peak_m", size=("large", "small"))
-    assert means.tolist() == [runs.mean("peak_m", size=size) for size in ("large", "small")]
+def test_means_by_the_values_of_a_key(full, quick):
+    means = full.runs.means("peak_m", size=("large", "small"))
+    assert means.tolist() == [full.runs.mean("peak_m", size=size) for size in ("large", "small")]
     with pytest.raises(UnknownName, match="did you mean"):
-        runs.means("peak_m", size=("large", "smal"))
+        full.runs.means("peak_m", size=("large", "smal"))
     with pytest.raises(MissingRuns):
-        run(quick=True).runs.means("peak_m", size=("small", "few"))
+        quick.runs.means("peak_m", size=("small", "few"))
 
 
 @pytest.mark.parametrize(
     "where", [{"size": "smal"}, {"siz": "small"}, {"size": "small", "los": True}]
 )
-@pytest.mark.parametrize("quick", [False, True])
-def test_a_misspelling_is_never_missing(where, quick):
-    runs = run(quick).runs
+@pytest.mark.parametrize("form", ["full", "quick"])
+def test_a_misspelling_is_never_missing(where, form, request):
+    runs = request.getfixturevalue(form).runs
     with pytest.raises(UnknownName, match="did you mean"):
         runs(**where)
     with pytest.raises(UnknownName):
@@ -214,24 +229,20 @@ def test_a_misspelling_is_never_missing(where, quick):
         runs(size="small")["peak"]
 
 
-def test_runs_that_lack_are_told_from_misspellings():
-    runs = run(quick=True).runs
-    assert not runs.has(size="few")
+def test_runs_that_lack_are_told_from_misspellings(quick):
+    assert not quick.runs.has(size="few")
     with pytest.raises(MissingRuns, match="size few"):
-        runs(size="few")
+        quick.runs(size="few")
     with pytest.raises(MissingRuns):
-        Runs([], runs.planned)(size="small")
+        Runs([], quick.runs.planned)(size="small")
 
 
-def test_statements_are_judged_part_by_part():
-    said = {one.name: one for one in run().statements}
-    assert (said["larger"].verdict, said["larger"].held, said["larger"].of) == ("in part", 1, 2)
+def test_statements_are_judged_part_by_part_and_what_the_quick_form_lacks_is_named(full, quick):
+    said = {one.name: one for one in full.statements}
+    assert (said["larger"].held, said["larger"].of) == (1, 2)
     assert said["larger"].verdict_words == "in part (1 of 2)"
     assert said["few"].verdict == "confirmed"
-
-
-def test_what_the_quick_form_lacks_is_named():
-    said = {one.name: one for one in run(quick=True).statements}
+    said = {one.name: one for one in quick.statements}
     assert said["few"].verdict == "not judged in the quick form"
     assert said["few"].words == "Few are few."
 
@@ -293,10 +304,10 @@ def test_the_scorecard_counts_each_fact_once():
     }
 
 
-def test_it_is_written_for_people_and_programs(tmp_path):
-    found = run()
-    found.write(tmp_path)
+def test_it_is_written_for_people_and_programs_and_a_whole_study_leaves_nothing_out(full, tmp_path):
+    assert full.write(tmp_path) == {}
     told = json.loads((tmp_path / "results.json").read_text())
+    assert told["left_out"] == {"figures": {}, "tables": {}, "numbers": {}}
     assert told["items"] == {"done": 17, "of": 17, "by_earlier_sessions": 0}
     assert told["units"] == {"peak_m": "m", "curve_m": "m"}
     assert told["arrays"] == ["curve_m"]
@@ -308,7 +319,7 @@ def test_it_is_written_for_people_and_programs(tmp_path):
     assert rows[-1] == "end,end,task,,,,,,,81.0"
     assert len(rows) == 10
     assert {path.name for path in tmp_path.glob("*.png")} == {"few.png", "all.png"}
-    assert len(found.tables()) == 2
+    assert len(full.tables()) == 2
 
 
 def test_the_table_of_statements_parts_rule_and_why():
@@ -355,52 +366,32 @@ def test_figures_and_tables_of_runs_that_lack_in_a_whole_full_form_are_failures(
     assert [table.title for table in others] == ["Peaks", STUDY.stated]
 
 
-def test_a_stopped_full_form_has_no_failures(tmp_path):
-    asked = iter([False] * 2 + [True] * 100)
-    session = StudySession(workers=1, should_stop=lambda: next(asked))
-    stopped = run(session=session, figures={"odd": lacking}, tables=[lacking])
-    assert stopped.write(tmp_path) == {}
+def test_statements_see_whole_cases_only_and_a_stopped_full_form_has_no_failures(tmp_path):
+    found = stopped(2, figures={"odd": lacking}, tables=[lacking])
+    assert 0 < len(found.runs) < 3
+    assert len(found.whole) == 0
+    assert found.write(tmp_path) == {}
     assert set(left_out(tmp_path)["figures"]) == {"odd"}
-    assert len(stopped.tables()) == len(stopped.statements[:1])
-
-
-def test_a_whole_study_leaves_nothing_out(tmp_path):
-    assert run().write(tmp_path) == {}
-    assert left_out(tmp_path) == {"figures": {}, "tables": {}, "numbers": {}}
+    assert len(found.tables()) == len(found.statements[:1])
 
 
 def test_a_stopped_study_continues_to_the_same_bytes(tmp_path):
-    def written(folder):
-        return {
-            name: (folder / name).read_bytes() for name in ("parts.npz", "runs.csv", "results.json")
-        }
-
     whole, parted = tmp_path / "whole", tmp_path / "parted"
-    run(session=StudySession(folder=whole, workers=1)).write(whole)
-    asked = iter([False] * 4 + [True] * 100)
-    stopped = run(session=StudySession(folder=parted, workers=1, should_stop=lambda: next(asked)))
-    assert stopped.interrupted
-    assert 0 < len(stopped.runs) < 9
-    assert "few" not in {one.name for one in stopped.statements}
-    continued = run(session=StudySession(folder=parted, workers=1))
+    run(session=replace(LOCAL, folder=whole)).write(whole)
+    first = stopped(4, parted)
+    assert first.interrupted
+    assert 0 < len(first.runs) < 9
+    assert "few" not in {one.name for one in first.statements}
+    continued = run(session=replace(LOCAL, folder=parted))
     assert continued.progress.found > 0
     continued.write(parted)
-    there, here = written(whole), written(parted)
-    assert there["parts.npz"] == here["parts.npz"]
-    assert there["runs.csv"] == here["runs.csv"]
-    one, other = (json.loads(each["results.json"]) for each in (there, here))
-    assert one.pop("runs", None) == other.pop("runs", None)
-    one.pop("items", None), other.pop("items", None)
-    assert one["statements"] == other["statements"]
+    for name in ("parts.npz", "runs.csv"):
+        assert (whole / name).read_bytes() == (parted / name).read_bytes()
+    one, other = (json.loads((each / "results.json").read_text()) for each in (whole, parted))
+    assert one.pop("items") != other.pop("items")
+    assert one == other
     with pytest.raises(OutputFolderError, match="runs is 3 there, 2 here"):
-        run(session=StudySession(folder=parted, workers=1, seeds=2))
-
-
-def test_statements_see_whole_cases_only():
-    asked = iter([False] * 2 + [True] * 100)
-    stopped = run(session=StudySession(workers=1, should_stop=lambda: next(asked)))
-    assert 0 < len(stopped.runs) < 3
-    assert len(stopped.whole) == 0
+        run(session=replace(LOCAL, folder=parted, seeds=2))
 
 
 def test_names_of_cases_are_unique_and_files():
@@ -416,11 +407,10 @@ def test_without_pandas_a_frame_is_refused_with_the_file_that_has_the_same(monke
         Runs([Run("a", None, {}, {"x": 1.0})]).frame()
 
 
-def test_a_frame_for_those_who_have_pandas(tmp_path):
+def test_a_frame_for_those_who_have_pandas(full, tmp_path):
     """It has the rows of the file: numbers, words, truth values, nothing for None, no arrays."""
     pd = pytest.importorskip("pandas")
-    runs = run().runs
-    frame = runs.frame()
+    runs, frame = full.runs, full.runs.frame()
     assert len(frame) == len(runs)
     assert list(frame.columns) == [
         "case", "size", "kind", "seed", "peak_m", "lost", "outcome", "nothing", "parts", "value",
@@ -436,3 +426,19 @@ def test_a_frame_for_those_who_have_pandas(tmp_path):
     assert list(read.columns) == list(frame.columns)
     for column in ("case", "peak_m", "value"):
         pd.testing.assert_series_equal(read[column], frame[column], check_dtype=False)
+
+
+def caption(before, *quick):
+    table = new_table("Shares", ("robot",), ())
+    table.caption = before
+    runs = [Run(str(n), None, {"grid": Form(one).grid}, {}) for n, one in enumerate(quick)]
+    return note_coarse(table, Runs(runs), "it means little.").caption
+
+
+def test_tables_of_coarse_grids_say_so_and_those_of_full_grids_and_of_none_nothing():
+    assert caption(None, True, True) == "Coarse grid: it means little."
+    assert caption("In per cent.", False, True) == "In per cent.\nCoarse grid: it means little."
+    assert caption("In per cent.", False) == "In per cent."
+    assert caption(None) is None
+    table = new_table("Distances", ("robot",), ())
+    assert note_coarse(table, Runs([Run("a", None, {"robot": "a"}, {})])).caption is None

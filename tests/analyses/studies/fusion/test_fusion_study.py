@@ -14,6 +14,7 @@ from cdpr_drake.analyses.studies.fusion.configurations import CONFIGURATIONS, QU
 from cdpr_drake.analyses.studies.fusion.statements import CHECKS
 from cdpr_drake.analyses.studies.fusion.study import STUDY
 from cdpr_drake.analyses.studies.fusion.trials import trial_scenario
+from tests.analyses.studies.made_up_studies import check_tables_are_made, made
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +48,12 @@ def test_the_quick_form_goes_on_and_is_written(quick):
     assert {one["verdict"] for one in stored["statements"]} == {NOT_IN_QUICK}
     assert len(stored["statements"]) == len(CHECKS)
     assert (folder / "fusion.png").stat().st_size > 10_000
-    assert all(table.row_count for table in result.tables())
+    check_tables_are_made(result)
 
 
 def test_what_is_wrong_is_drawn_by_seed_and_every_configuration_loads():
+    assert len(STUDY.plan(Form())) == len(CONFIGURATIONS) + 12
+    assert len(STUDY.plan(Form(quick=True))) == 4
     start = [
         trial_scenario((), 1.0, seed).perturbations.initial_pose.position for seed in (1, 1, 2)
     ]
@@ -82,11 +85,14 @@ def made_up(case, seed):
 @pytest.fixture(scope="module")
 def good():
     """Made-up runs of the full form."""
-    return replace(STUDY, measure=made_up)(False, StudySession(workers=1, seeds=2)).runs
+    return made(STUDY, made_up, quick=False, seeds=2).runs
 
 
-def test_what_is_stated_is_confirmed(good):
+def test_what_is_stated_is_confirmed_and_one_seed_has_no_spread(good):
     assert {one.verdict for one in judged(CHECKS, good)} == {CONFIRMED}
+    (said,) = judged(CHECKS[:1], good(seed=0), complete=True)
+    assert said.verdict == "not judged"
+    assert said.found == "runs are missing: a second seed, as one has no spread"
 
 
 @pytest.mark.parametrize(
@@ -111,15 +117,3 @@ def test_checks_look_at_the_runs(good, check, name, key, value):
     ]
     (said,) = judged([one for one in CHECKS if one.name == check], replace(good, rows=spoiled))
     assert said.verdict not in (CONFIRMED, "not judged")
-
-
-def test_one_seed_has_no_spread(good):
-    (said,) = judged(CHECKS[:1], good(seed=0), complete=True)
-    assert (said.verdict, said.found) == (
-        "not judged", "runs are missing: a second seed, as one has no spread",
-    )  # fmt: skip
-
-
-def test_cases_are_those_of_before():
-    assert len(STUDY.plan(Form())) == len(CONFIGURATIONS) + 12
-    assert len(STUDY.plan(Form(quick=True))) == 4

@@ -1,7 +1,5 @@
 """All rows of the servoing thesis' tables A.8 to A.18, as printed."""
 
-from __future__ import annotations
-
 import pytest
 
 from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, TABLES
@@ -23,7 +21,7 @@ ROUNDED_OTHERWISE = {
 """Rows whose printed share and volume do not agree to the last digit; the module names them."""
 
 
-def test_all_rows_are_there() -> None:
+def test_all_rows_are_there():
     assert {table.name: table.size for table in TABLES} == COUNTS
     assert sum(table.size for table in TABLES) == 468
     assert [len(row) for row in TABLES[7].rows.values()] == [12, 6, 7, 7, 6, 7]
@@ -55,13 +53,13 @@ def test_all_rows_are_there() -> None:
         ("A.18", "r_pc", 0.5, 94.029, 77.414),
     ],
 )
-def test_single_entries(name: str, bound: str, value: float, share: float, volume: float) -> None:
+def test_single_entries(name, bound, value, share, volume):
     (table,) = (table for table in TABLES if table.name == name)
     assert table.rows[bound][value] == share
     assert table.volumes[bound][value] == volume
 
 
-def test_every_row_of_bounds_starts_at_the_baseline_and_falls() -> None:
+def test_every_row_of_bounds_starts_at_the_baseline_and_falls():
     for table in TABLES:
         bounds = set(BASELINE_VALUES) - (set() if table.robot == "planar" else {"r_s"})
         assert set(table.rows) == bounds
@@ -74,7 +72,7 @@ def test_every_row_of_bounds_starts_at_the_baseline_and_falls() -> None:
             assert volumes == sorted(volumes, reverse=True)
 
 
-def test_shares_are_those_of_the_printed_volumes() -> None:
+def test_shares_are_those_of_the_printed_volumes():
     otherwise = set()
     for table in TABLES:
         for name, row in table.rows.items():

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.studies.framework.statement import judged
 from cdpr_drake.analyses.studies.framework.study import Case
 from cdpr_drake.analyses.studies.schemes.statements import CHECKS
@@ -29,6 +28,7 @@ from cdpr_drake.analyses.studies.schemes.trials import (
     turned,
 )
 from cdpr_drake.systems.diagrams.load import load_scenario
+from tests.analyses.studies.made_up_studies import made, verdicts
 
 BY_HAND = 1e-9
 
@@ -121,18 +121,13 @@ def made_up(case, seed):
     return row
 
 
-def said(spoil=lambda case, seed: {}):
+def said(spoil):
     """Verdicts by name, of made-up runs with changes."""
 
     def changed(case, seed):
         return made_up(case, seed) | spoil(case, seed)
 
-    found = replace(STUDY, measure=changed)(False, StudySession(workers=1, seeds=3))
-    return {one.name: one.verdict for one in found.statements}
-
-
-def test_what_is_said_is_judged():
-    assert set(said().values()) == {"confirmed"}
+    return {one.name: one.verdict for one in made(STUDY, changed, False, seeds=3).statements}
 
 
 @pytest.mark.parametrize(
@@ -161,14 +156,15 @@ def test_a_field_that_loses_almost_as_many_holds_in_part():
 
 
 def test_what_lacks_is_not_judged():
-    runs = replace(STUDY, measure=made_up)(False, StudySession(workers=1, seeds=1)).runs
+    runs = made(STUDY, made_up, False, seeds=1).runs
     without = replace(runs, rows=[run for run in runs if run.case != "ACROBOT, 2.5d"])
     names = {one.name for one in judged(CHECKS, without, complete=False)}
     assert {one.name for one in CHECKS} - names == {"hybrid_free_of_minima"}
 
 
-def test_it_tabulates_and_writes(tmp_path):
-    study = replace(STUDY, measure=made_up)(True, StudySession(workers=1, seeds=2))
+def test_it_judges_tabulates_and_writes(tmp_path):
+    assert set(verdicts(made(STUDY, made_up, False, seeds=3)).values()) == {"confirmed"}
+    study = made(STUDY, made_up, seeds=2)
     assert len(study.runs) == len(VARIANTS) * (len(TURNS_DEG) + 2 + 2)
     assert len(study.tables()) == 4
     study.write(tmp_path)

@@ -1,12 +1,9 @@
 """The study of stability ranges: its questions, what it finds, that it runs, stops and writes."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,21 +11,11 @@ import pytest
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import (
-    MET_CONSTRUCTION,
-    Check,
-    judged,
-)
-from cdpr_drake.analyses.studies.framework.study import Form, StudyResult
-from cdpr_drake.analyses.studies.stability_ranges import robot_limits
-from cdpr_drake.analyses.studies.stability_ranges.question import (
-    NESTED,
-    SECTIONS,
-    bisected,
-    falls,
-    found,
-    published,
-)
+from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION, judged
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.stability_ranges import question, robot_limits
+from cdpr_drake.analyses.studies.stability_ranges import single_errors as single
+from cdpr_drake.analyses.studies.stability_ranges.question import found
 from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     LimitedRobot,
     RangeSearch,
@@ -36,43 +23,40 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     camera_at,
 )
 from cdpr_drake.analyses.studies.stability_ranges.robots import PLANAR_OTHERS, SPATIAL_OTHERS
-from cdpr_drake.analyses.studies.stability_ranges.single_errors import (
-    FULL_VOLUME,
-    KNOWN,
-    LOWER_CORNER,
-    NO_TURN,
-    SAMPLED,
-)
 from cdpr_drake.analyses.studies.stability_ranges.study import STUDY, cases
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.stability.criterion_closed_forms import planar_margin
+from tests.analyses.studies.made_up_studies import with_figures
 
 STEP = 0.01
 """Resolution of the limits that these tests look for [m]."""
 
 
 @pytest.fixture(scope="module")
-def quick() -> StudyResult:
-    """The quick form."""
-    return STUDY(True, StudySession(workers=1))
+def quick():
+    """The quick form, in which every pose is looked at less hard."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_limits, "OPTIONS", replace(robot_limits.OPTIONS, draws=10, searches=1))
+        patch.setattr(single, "DRAWS", 100)
+        return STUDY(True, StudySession(workers=1))
 
 
-def test_bisection_finds_the_last_multiple() -> None:
-    assert bisected(lambda x: x < 0.735, 2.0, 0.01) == pytest.approx(0.73)
-    assert bisected(lambda x: True, 2.0, 0.01) == 2.0
-    assert bisected(lambda x: False, 2.0, 0.01) == 0.0
+def test_bisection_finds_the_last_multiple():
+    assert question.bisected(lambda x: x < 0.735, 2.0, 0.01) == pytest.approx(0.73)
+    assert question.bisected(lambda x: True, 2.0, 0.01) == 2.0
+    assert question.bisected(lambda x: False, 2.0, 0.01) == 0.0
 
 
 @pytest.mark.parametrize("quick_form", [False, True])
-def test_questions_pickle_and_are_of_all_sections(quick_form: bool) -> None:
+def test_questions_pickle_and_are_of_all_sections(quick_form):
     questions = STUDY.plan(Form(quick_form))
-    assert {one.keys["section"] for one in questions} == set(SECTIONS)
+    assert {one.keys["section"] for one in questions} == set(question.SECTIONS)
     for one in questions:
         assert " " not in one.name
         assert pickle.loads(pickle.dumps(one)).name == one.name
 
 
-def test_limits_of_the_object_alone_are_those_of_the_closed_form() -> None:
+def test_limits_of_the_object_alone_are_those_of_the_closed_form():
     # With an exact robot and camera the limit is 2 m, whatever the platform and e.
     limits = RobotLimits(place=0.3, psi=30.0, error=1.0)
     found = RangeSearch(LimitedRobot("planar", coarse=True)).largest(limits, ("r_s",), 3.0, STEP)
@@ -86,7 +70,7 @@ def test_limits_of_the_object_alone_are_those_of_the_closed_form() -> None:
     assert limit - 2.0 * STEP < found < limit + STEP
 
 
-def test_samples_lie_within_limits_and_on_their_edges() -> None:
+def test_samples_lie_within_limits_and_on_their_edges():
     limits = replace(SPATIAL_OTHERS, psi=40.0, phi=20.0, theta=10.0, place=0.2)
     poses, errors = LimitedRobot("acrobot_small").samples(limits)
     assert len(poses) == len(errors) == 9 * 3 * 3 * 7 * 7
@@ -102,7 +86,7 @@ def test_samples_lie_within_limits_and_on_their_edges() -> None:
     assert planar[:, 1:3] == pytest.approx(0.0)
 
 
-def test_mirrored_places_stand_for_all() -> None:
+def test_mirrored_places_stand_for_all():
     limits = replace(PLANAR_OTHERS, place=0.4, r_bp=0.05)
     for r_bp in (0.04, 0.05, 0.06, 0.07):
         some = RangeSearch(LimitedRobot("planar", mirrored=True))
@@ -110,7 +94,7 @@ def test_mirrored_places_stand_for_all() -> None:
         assert some.stable(replace(limits, r_bp=r_bp)) == every.stable(replace(limits, r_bp=r_bp))
 
 
-def test_larger_limits_are_not_easier() -> None:
+def test_larger_limits_are_not_easier():
     robot = LimitedRobot("planar", camera_at(0.03, 0.0, 20.0), coarse=True)
     names = ("place", "error", "r_B", "r_pc", "d_theta_pc", "r_s", "d_theta_bp")
     reference = RangeSearch(robot).largest(PLANAR_OTHERS, ("r_bp",), 0.4, STEP)
@@ -122,12 +106,14 @@ def test_larger_limits_are_not_easier() -> None:
     assert certified <= reference
 
 
-def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> None:
+def test_quick_form_answers_everything(quick, tmp_path):
     assert not quick.interrupted
     assert len(quick.statements) == len(STUDY.checks) == 21
-    assert len(quick.tables()) == len(SECTIONS) + 2
-    assert quick.write(tmp_path) == {}
-    assert {path.stem for path in tmp_path.glob("*.png")} == set(STUDY.figures)
+    assert len(quick.tables()) == len(question.SECTIONS) + 2
+    some, drawn = with_figures(quick, "single_errors")
+    assert drawn == set(STUDY.figures)
+    assert some.write(tmp_path) == {}
+    assert {path.stem for path in tmp_path.glob("*.png")} == {"single_errors"}
     told = json.loads((tmp_path / "results.json").read_text())
     assert told["units"]["certified_m"] == "m"
     for run in quick.runs:
@@ -137,28 +123,28 @@ def test_quick_form_answers_everything(quick: StudyResult, tmp_path: Path) -> No
                     assert run[f"{less}_{unit}"] <= run[f"{more}_{unit}"]
 
 
-def test_published_numbers(quick: StudyResult) -> None:
+def test_published_numbers(quick):
     by_name = {run.case: run for run in quick.runs}
     assert found(by_name["planar-I"]) == pytest.approx(2.0, abs=2e-3)
     assert 6.0 <= found(by_name["planar-II-5-0.5-0.3"]) < 8.0
-    assert published(by_name["planar-II-0.5-0.3-0.2"]) == 61.0
+    assert question.published(by_name["planar-II-0.5-0.3-0.2"]) == 61.0
     assert 61.0 <= found(by_name["planar-II-0.5-0.3-0.2"]) < 65.0
-    full = by_name["single-r_pc-0.2"][SAMPLED]
-    assert full == pytest.approx(FULL_VOLUME, abs=1e-3)
+    full = by_name["single-r_pc-0.2"][single.SAMPLED]
+    assert full == pytest.approx(single.FULL_VOLUME, abs=1e-3)
     assert by_name["single-r_pc-1"]["certified_m3"] == full
     assert by_name["single-d_theta_pc_deg-40"]["searched_m3"] == full
-    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"][SAMPLED] < 0.7 * full
-    assert by_name["single-d_theta_pc_deg-65"][SAMPLED] == 0.0
+    assert 0.2 * full < by_name["single-d_theta_pc_deg-55"][single.SAMPLED] < 0.7 * full
+    assert by_name["single-d_theta_pc_deg-65"][single.SAMPLED] == 0.0
     turned = by_name["single-d_theta_s_deg-90"]
-    assert turned[SAMPLED] == 0.0
-    assert turned[NO_TURN] == turned[KNOWN] == full
+    assert turned[single.SAMPLED] == 0.0
+    assert turned[single.NO_TURN] == turned[single.KNOWN] == full
 
 
-def checked(name: str) -> Check:
+def checked(name):
     return next(check for check in STUDY.checks if check.name == name)
 
 
-def test_statements_follow_from_the_runs(quick: StudyResult) -> None:
+def test_statements_follow_from_the_runs(quick):
     said = {one.name: one.verdict for one in quick.statements}
     assert said["vision_alone"] == MET_CONSTRUCTION
     assert said["camera_turn"] == IN_PART
@@ -175,30 +161,30 @@ def test_statements_follow_from_the_runs(quick: StudyResult) -> None:
     assert checked("smaller_range").judge(Runs(changed)).verdict == NOT_CONFIRMED
 
 
-def row(case: str, keys: dict[str, object], *values: float) -> Runs:
+def row(case, keys, *values):
     """Runs of a case's group, in which so much was found."""
     return Runs([Run(f"{case}{k}", None, keys, {"searched_m": x}) for k, x in enumerate(values)])
 
 
 @pytest.mark.parametrize("name", ["smaller_range", "anchor_error", "turn_and_tilt"])
-def test_orders_that_hold_by_construction_say_so(name: str, quick: StudyResult) -> None:
+def test_orders_that_hold_by_construction_say_so(name, quick):
     said = next(one for one in quick.statements if one.name == name)
     assert said.verdict == CONFIRMED
-    assert said.why == NESTED
+    assert said.why == question.NESTED
 
 
-def test_missing_questions_are_no_verdict() -> None:
+def test_missing_questions_are_no_verdict():
     (said,) = judged([checked("smaller_range")], Runs([], lambda: STUDY.planned(Form())))
     assert said.found.startswith("runs are missing")
 
 
-def test_falls() -> None:
-    assert falls(row("r", {}, 3.0, 2.0, 2.0))
-    assert not falls(row("r", {}, 2.0, 2.0))
-    assert not falls(row("r", {}, 3.0, 1.0, 2.0))
+def test_falls():
+    assert question.falls(row("r", {}, 3.0, 2.0, 2.0))
+    assert not question.falls(row("r", {}, 2.0, 2.0))
+    assert not question.falls(row("r", {}, 3.0, 1.0, 2.0))
 
 
-def test_a_stopped_study_continues(tmp_path: Path) -> None:
+def test_a_stopped_study_continues(tmp_path):
     few = replace(STUDY, cases=lambda form: list(cases(form))[:8])
     seen: list[WorkProgress] = []
     first = few(
@@ -213,9 +199,7 @@ def test_a_stopped_study_continues(tmp_path: Path) -> None:
     assert len(second.runs) == 8
 
 
-def test_a_folder_of_other_questions_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_of_other_questions_is_refused(tmp_path, monkeypatch):
     few = replace(STUDY, cases=lambda form: list(cases(form))[:2])
     few(True, StudySession(folder=tmp_path, should_stop=lambda: True, workers=1))
     monkeypatch.setattr(robot_limits, "TURN_STEP", 5.0)
@@ -229,7 +213,7 @@ CAMERA_PLACES = {
 }  # fmt: skip
 
 
-def cameras(**limits: float) -> Runs:
+def cameras(**limits):
     """Runs of cameras at these places; `limits` differ from 0.1 m."""
     rows = []
     for name, (x, y, turn) in CAMERA_PLACES.items():
@@ -252,14 +236,12 @@ def cameras(**limits: float) -> Runs:
         ({"on_an_edge": 0.08, "turned_90_deg": 0.12}, 0, 2),
     ],
 )
-def test_one_step_of_the_search_is_no_effect_of_the_camera(
-    limits: dict[str, float], held: int, of: int
-) -> None:
+def test_one_step_of_the_search_is_no_effect_of_the_camera(limits, held, of):
     said = checked("planar_camera_place").judge(cameras(**limits))
     assert (said.held, said.of) == (held, of)
 
 
-def test_cameras_are_compared_by_steps_finer_than_what_counts() -> None:
+def test_cameras_are_compared_by_steps_finer_than_what_counts():
     steps = [one.data.args[4] for one in STUDY.plan(Form()) if one.keys["group"] == "camera"]
     assert len(steps) == 6
     assert max(steps) <= 0.01 * 0.1 / 5.0
@@ -274,13 +256,11 @@ def test_cameras_are_compared_by_steps_finer_than_what_counts() -> None:
         ((0.9, 1.014, 0.1), (False, False, False)),
     ],
 )
-def test_each_part_of_the_turned_camera_can_fail(
-    volumes: tuple[float, ...], held: tuple[bool, ...]
-) -> None:
+def test_each_part_of_the_turned_camera_can_fail(volumes, held):
     rows = [
         Run(f"single-{k}", None,
-            {"section": SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
-            {SAMPLED: volume, "searched_m3": volume, LOWER_CORNER: volume})
+            {"section": question.SECTIONS[-1], "group": "d_theta_pc_deg", "sought": "workspace"},
+            {single.SAMPLED: volume, "searched_m3": volume, single.LOWER_CORNER: volume})
         for k, volume in enumerate(volumes)
     ]  # fmt: skip
     said = checked("camera_turn").find(Runs(rows))

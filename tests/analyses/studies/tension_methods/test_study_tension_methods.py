@@ -16,6 +16,7 @@ from cdpr_drake.analyses.studies.tension_methods.experiments import (
 )
 from cdpr_drake.analyses.studies.tension_methods.study import COVERAGE, STUDY, measure
 from cdpr_drake.cli.app import main
+from tests.analyses.studies.made_up_studies import with_figures
 from tests.messages import printed
 
 RESULTS = "results.json"
@@ -49,14 +50,15 @@ def test_exact_methods_follow_and_hold_their_bounds(study):
 
 
 def test_results_can_be_written_and_read(study, tmp_path):
-    assert study.write(tmp_path) == {}
+    names = {"thesis_errors", "gains_linear_program", "coverage"}
+    some, drawn = with_figures(study, *names)
+    assert names < drawn < set(STUDY.figures)
+    assert some.write(tmp_path) == {}
+    assert {path.stem for path in tmp_path.glob("*.png")} == names
     results = json.loads((tmp_path / RESULTS).read_text())
-    assert results == json.loads(json.dumps(study.as_dict()))
+    assert results == json.loads(json.dumps(some.as_dict()))
     assert results["parameters"]["start_least_shift_m"] > 0.0
     assert results["units"]["tension_max_n"] == "N"
-    names = {path.stem for path in tmp_path.glob("*.png")}
-    assert names >= {"thesis_errors", "gains_linear_program", "coverage"}
-    assert names < set(STUDY.figures)
     titles = [str(table.title) for table in study.tables()]
     assert [title.partition(":")[0] for title in titles[:4]] == [
         "thesis", "printed", "acrobot", "caroca_gazebo",
@@ -104,8 +106,10 @@ def command(capsys, *arguments):
 @pytest.fixture
 def tiny(monkeypatch, study, tmp_path):
     """In place of the study, one that has a short result at once."""
-    case = study.cases[0]
-    found = replace(study, cases=(case,), finished={case.name: study.finished[case.name]})
+    case, name = study.cases[0], "thesis_errors"
+    small = replace(STUDY, figures={name: STUDY.figures[name]})
+    done = {case.name: study.finished[case.name]}
+    found = replace(study, study=small, cases=(case,), finished=done)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setitem(STUDIES, "tension-methods", StudyEntry(lambda *_: found))
     return found

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_JUDGED
 from cdpr_drake.analyses.studies.framework.runs import Runs
 from cdpr_drake.analyses.studies.framework.statement import MET_CONSTRUCTION
 from cdpr_drake.analyses.studies.framework.study import Form
@@ -22,6 +22,7 @@ from cdpr_drake.analyses.studies.worked_examples.examples import (
     by_printed_coefficients,
 )
 from cdpr_drake.analyses.studies.worked_examples.study import STUDY
+from tests.analyses.studies.made_up_studies import check_tables_are_made
 
 ROUNDING = 1e-9
 """Of polynomials in a time up to 100 s [m]."""
@@ -52,6 +53,7 @@ def changed(study, example, **columns):
 def test_every_statement_is_judged(study):
     found = {one.name: one.verdict for one in study.statements}
     assert tuple(found) == STUDY.names_of_checks()
+    assert NOT_JUDGED not in found.values()
     assert found["two_programs"] == CONFIRMED
     assert found["meets_conditions"] == MET_CONSTRUCTION
     assert found["homing_tensions"] == found["border_tensions"] == CONFIRMED
@@ -107,6 +109,7 @@ def test_it_leaves_numbers_and_figures(study, tmp_path):
     assert areas["homing"] > areas["border"]
     assert {path.stem for path in tmp_path.glob("*.png")} == {"trajectory", "feasible_polygons"}
     assert len(study.tables()) == 2
+    check_tables_are_made(study)
 
 
 def test_it_stops_where_it_is_asked_to():

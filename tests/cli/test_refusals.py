@@ -1,0 +1,464 @@
+"""What commands refuse: in one line that names what was found, and nothing is written."""
+
+import shlex
+from pathlib import Path
+
+import pytest
+import yaml
+
+from cdpr_drake.cli import app
+from cdpr_drake.errors import CdprError, accepted_names
+from cdpr_drake.models.robot_loader import robot_text
+from cdpr_drake.systems.scenarios.files import scenario_file
+from tests.cli.commands import refuse, run
+
+SERIES = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.csv"
+
+FILES = {
+    "file": "", "full/old": "", "mine/thesis.tex": "x", "mine.yaml": "years of work",
+    "bad.yaml": "name: x\nrobot: [1,\n", "list.yaml": "- r_A\n",
+    "zero.yaml": "box: [0, 0, 0, 0, 0, 0]\n", "inf.yaml": "box: [0, 0, 0, .inf, 0, 0]\n",
+    "none.yaml": "vertices: []\n", "verts.yaml": "verts: []\n",
+    "spheres.yaml": "spheres: [{position: [0, 0, 0], radius: 0}]\n",
+    "log.csv": "time_s,C1_length_m\n0,1\n0.1,1.1\n0.2,1.2\n", "empty.csv": "",
+    "headed.csv": "time_s,C1_tension_n\n", "pulled.csv": "time_s,C1_tension_n\n0,1\n1,2\n",
+    "posed.csv": "time_s,x_m,y_m,z_m,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n",
+    "nan.csv": "x_m,C1_tension_n\n0,nan\n", "timeless.csv": "C1_tension_n\n1\n",
+    "long.csv": "time_s,C1_length_m,x_m\n0,1," + "9" * 200_000 + "\n",
+    "series.csv": SERIES.read_text(),
+}  # fmt: skip
+"""What lies in the folder, besides hung.yaml and empty folders."""
+
+FOLDERS = ("empty", "acrobot_pbvs", "old")
+
+QUICK = "--camera projected --duration 0.3"
+TALE = "acrobot_broken_redistributed --compare-reactions 5 --break-time 0.3 --after 0.3"
+NOBODY = "tcp://127.0.0.1:9"
+BAD_FORMAT = "--format: found 'pgn'; accepted: png, pdf, svg, or several with commas"
+
+REFUSED = {
+    "": [
+        ("fly", "No such command"),
+        ("view foo", "unknown"),
+        ("view planar --html no/such/page.html", "no folder"),
+        *((f"view acrobot_small --html {name}",
+           f"--html: found {name}; accepted: a file that ends in .html")
+          for name in ("mine.yaml", "new.txt", "new")),
+        ("view planar --host 'no such host'", "--host"),
+        ("view planar --html a --port 7000", "without --html"),
+        ("bench foo", "unknown"),
+        ("examples --out new", "without an example; accepted: with a name, or all"),
+        ("examples two_robot", "two_robots"),
+        ("calibrate planar long.csv", "long.csv"),
+        ("plan acrobot_large --path long.csv", "long.csv"),
+        ("import long.csv", "long.csv"),
+    ],
+    "simulate": [
+        ("foo", "scenario 'foo' is unknown", "acrobot_against_wind", "planar_pbvs"),
+        ("nothing.yaml", "nothing.yaml", "no such scenario file"),
+        ("bad.yaml", "bad.yaml:3: does not parse as YAML"),
+        ("empty", "without scenario.yaml"),
+        ("./acrobot_pbvs", "without scenario.yaml"),
+        ("--set robot=foo", "robot 'foo' is unknown", "acrobot_small"),
+        ("--set foo.bar=1", "--set foo.bar", "no key foo"),
+        ("--set controller.lamda_0=1", "did you mean lambda_0?"),
+        ("--set controller.lambda_0", "accepted: key=value"),
+        ("--set controller.lambda_0=-1", "found -1", "> 0"),
+        ("--set controller.lambda_infinity=9", "lambda_infinity", "at most lambda_0"),
+        ("--set initial_pose.position=[0,0]", "found [0, 0]", "3 numbers"),
+        ("--set initial_pose.position=[.nan,0,0]", "found .nan"),
+        ("--set initial_pose.position=[0,0,9]", "(0, 0, 9)", "outside the frame"),
+        ("--set initial_pose.position=[0,0,1.1]", "cannot hold the platform"),
+        ("--set perturbations.believed_robot=planar", "believed_robot: found 4 cables"),
+        ("--set camera.mount=nose", "camera.mount", "onboard"),
+        ("acrobot_pbvs --camera projected --set 'target.pose.position=[-0.5, 0.5, 0]' --out run",
+         "its middle would be at (2937, 3134) px"),
+        ("--camera film", "camera.kind", "rendered, projected"),
+        ("--duration -1", "duration", "> 0"),
+        ("--duration soon", "--duration"),
+        ("--seed 1.5", "--seed"),
+        ("--out file", "found a file"),
+        ("--out full", "holds files already", "--overwrite"),
+        ("--out file/below", "cannot be written"),
+        ("--nonsense", "--nonsense"),
+        (f"{QUICK} --port 7000", "--meshcat only"),
+        (f"{QUICK} --log-format xlsx", "accepted: some of csv,npz,mat"),
+        ("--finish mine", "holds no log"),
+        ("--finish nothing", "holds no log"),
+        ("--finish no/such/folder", "not there"),
+        ("acrobot_pbvs --camera projected --finish mine", "--finish: accepted with"),
+        ("--continue nothing", "holds no log"),
+        ("--continue no/such/folder", "not there"),
+        ("--continue a --finish a", "--finish: accepted with"),
+        ("acrobot_mobile_robot --continue a", "--continue: accepted with"),
+        ("--seeds 3:1", "--seeds: found '3:1'; accepted: first:end"),
+        ("--seeds 0:2 --seed 3", "without --seed and --video"),
+        ("--seeds 0:2 --video", "without --seed and --video"),
+        ("--workers 2", "--workers: accepted with --seeds only"),
+        ("acrobot_computed_torque --seeds 0:2", "accepted for visual servos"),
+        ("--seeds 0:2 --set initial_pose.position=[0,0,1.1]", "cannot hold"),
+        (f"{QUICK} --seeds 1 --workers 1 --out .", "found the working folder or one above it"),
+        (f"{TALE} --duration 3", "--duration: accepted without --compare-reactions"),
+        (f"{TALE} --seeds 0:3", "--seeds: accepted without --compare-reactions"),
+        (f"{TALE} --reactions pray", "--reactions: found 'pray'; accepted: none, stop"),
+        (f"{TALE} --break-time 0", "--break-time: found 0; accepted: a number > 0"),
+        ("acrobot_pbvs --after 1", "--after: accepted with --compare-reactions only"),
+        ("--camera projected --out there --format pgn", BAD_FORMAT),
+        ("--camera projected --seeds 0:2 --out there --format pgn", BAD_FORMAT),
+        ("acrobot_computed_torque --out there --format pgn", BAD_FORMAT),
+    ],
+    "serve": [
+        ("acrobot_computed_torque --place servo", "distributor, controller, trajectory"),
+        ("acrobot_pbvs --place controller", "servo, twist"),
+        ("acrobot_computed_torque --pace fast", "remote.pace"),
+        ("acrobot_computed_torque --timeout 0", "remote.timeout"),
+        ("acrobot_computed_torque --host no.such.invalid", "--host, --port"),
+        ("acrobot_open_loop", "open_loop: found a section with remote"),
+        ("acrobot_torque_servo --place servo", "winches.mode torque; accepted: twist"),
+        ("nothing", "scenario 'nothing' is unknown"),
+    ],
+    "new": [
+        ("robot mine --robot caroca", "accepted: with scenario, alone"),
+        ("controller mine --robot caroca", "accepted: with scenario, alone"),
+        ("scenario mine --robot caroca --from acrobot_pbvs", "accepted: with scenario, alone"),
+        ("scenario mine --robot acrobot_smal", "did you mean acrobot_small"),
+        ("controler x",
+         "'controler' is unknown; did you mean controller? known: robot, scenario"),
+        ("controller My-Law", "name: found 'My-Law'; accepted: the name of a Python module"),
+        ("controller numpy", "name: found 'numpy', an installed module"),
+        ("estimator json", "name: found 'json', an installed module"),
+        ("estimator class", "name: found 'class'; accepted: the name of a Python module"),
+        ("estimator x --from planar", "--from: found planar with estimator"),
+        ("controller law --out file --overwrite", "cdpr: file: found a file; accepted: a folder"),
+        ("robot law --out file --overwrite", "cdpr: file: found a file; accepted: a folder"),
+    ],
+    "robots": [
+        ("--motion 9R", "--motion: found '9R'; accepted: ", "3R3T"),
+        ("--cables many", "--cables: found 'many'; accepted: such as 8"),
+        ("--cables -", "--cables: found '-'"),
+        ("--cables 99", "found no robot with all of these"),
+        ("--gallery page.txt", "--gallery: found page.txt; accepted: ", ".html"),
+        ("--gallery no/such/page.html", "found no folder"),
+        ("--mechanisms --cables 8", "--mechanisms: found with other choices"),
+    ],
+    "tension": [
+        ("cable_arm --wrench 0,0,0,0,0,1", "--wrench: found with a mechanism"),
+        ("planar --joint a=1 --pose 0,0,0", "--joint: found with a robot"),
+        ("nowhere.yaml", "nowhere.yaml"),
+        ("cable_arm --method none", "method: found none"),
+    ],
+    "static": [
+        ("cable_arm --pose 0,0,0", "--pose: found with a mechanism"),
+        ("planar --held none", "--held: found with a robot with one platform"),
+        ("cable_arm --joint elbow", "--joint: found 'elbow'"),
+        ("cable_arm --joint knee=1", "found knee; accepted: one of cable_arm::elbow"),
+        ("cable_arm --yields both", "yields: found 'both'"),
+        ("cable_arm --prestress 1,2", "--prestress: found '1,2'"),
+        ("cable_arm --lengths 1,2", "--lengths: found '1,2'"),
+        ("cable_arm --lengths ''", "--lengths: found ''"),
+        ("cable_arm --held knee", "joint: found knee"),
+    ],
+    "equilibria hung.yaml": [
+        ("--lengths 0.5,0.5", "no pose has them: cables 1 and 2 together are"),
+        ("--lengths 3.8", "--lengths: found '3.8'"),
+        ("--lengths 3.8,-1", "--lengths: found -1"),
+        ("--lengths 3.8,nan", "--lengths"),
+        ("", "found neither"),
+        ("--lengths 3,3 --position 0,0,1", "found both"),
+        ("--lengths 3,3 --taut C1", "--taut: found without --position"),
+        ("--position 0,0,1 --taut C1,C9", "--taut: 'C9' is unknown"),
+        ("--position 0,0,1", "accepted: 3 different ones"),
+        ("--lengths 3,3 --cable-model rubber", "--cable-model: 'rubber'"),
+        ("--lengths 3,3 --searches 0", "--searches: found 0"),
+    ],
+    "equilibria planar": [("--lengths 1,1,1,1", "no weight along the motions")],
+    "workspace planar --grid 9,9,1 --workers 1": [
+        ("--kind statc", "--kind 'statc'", "static"),
+        ("--measure capacity", "--measure 'capacity'", "capacity-margin"),
+        ("--kind wrench-feasible", "wrench-feasible", "--wrench-set"),
+        ("--kind dynamic", "dynamic", "--acceleration"),
+        ("--kind target-visible", "target-visible", "--scenario"),
+        ("--orientations most", "--orientations", "all"),
+        ("--force inf", "force", "finite"),
+        ("--force 1 --wrench-set no.yaml", "--wrench-set", "--force"),
+        ("--wrench-set no.yaml", "no.yaml", "no such file"),
+        ("--kind wrench-feasible --wrench-set zero.yaml", "zero.yaml", "no wrench but zero"),
+        ("--kind wrench-feasible --wrench-set inf.yaml", "inf.yaml", "box"),
+        ("--kind wrench-feasible --wrench-set none.yaml", "none.yaml", "vertices"),
+        ("--kind wrench-feasible --wrench-set verts.yaml", "verts.yaml", "verts"),
+        ("--obstacles no.yaml", "no.yaml", "no such file"),
+        ("--kind static,collision-free --certify --obstacles spheres.yaml", "spheres[0].radius"),
+        ("--acceleration -1", "--acceleration"),
+        ("--velocity 1,2", "--velocity", "1,2"),
+        ("--clearance -1", "--clearance"),
+        ("--measure payload", "payload", "planar"),
+        ("--hull 0,0,0.3", "--hull", "planar"),
+        ("--mesh a.stl", "--mesh", "--hull"),
+        ("--certify --kind static,singularity-free",
+         "--certify", "static,singularity-free", "collision-free"),
+        ("--certify --boxes 0", "--boxes", "0"),
+        ("--certify --method closed_form", "--certify", "--method closed_form"),
+        ("--box 0:1,0:1", "--box", "lower:upper"),
+        ("--box 0:1,0:1,1:0", "--box", "1:0"),
+        ("--box 0:1,0:1,0:inf", "--box", "inf"),
+        ("--box -1e308:1e308,0:1,0:1", "--box", "1e+06"),
+        ("--box 0:1,0:1,nan:1", "--box", "nan"),
+        ("--box 5:6,0:1,0:1 --grid 3,3,1", "grid", "frame of planar"),
+        ("--unbounded", "--unbounded", "--hull"),
+        ("--unbounded --hull 0,0,0.3 --box 0:1,0:1,0:1", "--unbounded", "--box"),
+        ("--method closed", "closed", "closed_form"),
+        ("--method barycenter", "barycenter", "redundancy"),
+        ("--method dykstra --kind wrench-closure", "--method dykstra", "static"),
+        ("--refine 0,0,0", "--refine", "--certify"),
+        ("--certify --refine 0,0", "--refine", "x,y,z"),
+        ("--certify --refine 0,0,0 --refine-boxes 0", "--refine-boxes", "0"),
+        ("--certify --refine 0,0,0 --refine-reach -1", "--refine-reach", "-1"),
+        ("--boxes-mesh a.vtu", "--boxes-mesh", "--certify"),
+        ("--certify --boxes-mesh a.stl", "a.stl", "vtu"),
+        ("--orientation 0,0,0:10:0", "psi", "step"),
+        ("--orientation 0,0", "--orientation"),
+        ("--orientation 0,0,0:360:0.001", "--orientation", "10000"),
+        ("--mass 0", "--mass"),
+        ("--workers 0", "--workers"),
+    ],
+    "workspace acrobot_large": [("--grid 3,3,3 --hull 0,0,1.19", "such as (")],
+    "stability": [
+        ("planar --scheme ibvs", "ibvs", "planar", "pbvs, pbvs-line"),
+        ("planar --scheme nonsense", "nonsense", "2.5d"),
+        ("nobody", "robot 'nobody' is unknown"),
+        ("planar --grid 0,5,1", "grid", "x", "0 points"),
+        ("planar --grid 1:0:0.1,5,1", "grid", "x", "lower <= upper"),
+        ("planar --grid 5,5", "--grid", "'5,5'", "lower:upper:step"),
+        ("planar --grid 5,5,a", "--grid", "lower:upper:step"),
+        ("planar --grid 5,5,0:1:0.1", "z from 0 to 1"),
+        ("planar --grid 5,5,4", "--grid", "found 4 points along z", "z = 0.3"),
+        ("acrobot_small --grid 1e12,1e12,1e12", "--grid: found 1e+36 poses", "1e+07"),
+        ("acrobot_small --grid 3000,3000,1000", "--grid: found 9e+09 poses", "1e+07"),
+        ("acrobot_small --grid 0:1:1e-9,3,3", "--grid: found 9e+09 poses"),
+        ("acrobot_small --grid 0:1:1e-320,3,3", "--grid: found inf poses"),
+        ("acrobot_small --grid inf,3,3", "--grid", "lower:upper:step"),
+        ("acrobot_small --grid 5:6:0.5,3,3",
+         "grid", "x from 5 to 6", "(-0.6, -0.6, 0) to (0.6, 0.6, 1.2)"),
+        ("planar --mass -1", "--mass: found -1", ">= 0 [kg]"),
+        ("planar --draws many", "--draws", "'many'", "see cdpr stability --help"),
+        ("", "Missing argument 'robot'; see cdpr stability --help"),
+        ("README.md", "'README.md'", "has to end in .yaml"),
+        ("planar --bounds list.yaml", "list.yaml", "r_bp, d_theta_bp_deg, r_pc"),
+        ("planar --vary r_A", "--vary", "name=value"),
+        ("planar --vary r_A=-0.1", "r_A", "-0.1", ">= 0"),
+        ("planar --vary r_A=x", "--vary"),
+        ("planar --bounds nothing.yaml", "nothing.yaml", "no such file"),
+        ("planar --orientation 1,2", "--orientation", "phi,theta,psi"),
+        ("planar --workers 0", "--workers", "at least 1"),
+        ("acrobot_large --scenario acrobot_moving_tag", "target.motion", "rests"),
+        ("planar --draws 0", "draws", "at least 1"),
+        ("planar --searches -1", "searches", "found -1", "at least 1"),
+        ("planar --pieces 0", "pieces", "found 0", "at least 1"),
+        ("planar --verdict guessed", "verdict", "sampled"),
+        (f"planar --scheduler {NOBODY}", NOBODY, "this machine"),
+        ("acrobot_large --grid 2,2,2 --out there --format pgn", BAD_FORMAT),
+    ],
+    "study": [
+        *((f"{name} --quick --scheduler {NOBODY}", NOBODY)
+          for name in ("worked-examples", "workspaces", "case-9")),
+        *((f"fusion --quick --out r {option} {value}", option, value) for option, value in (
+            ("--seeds", "5:5"), ("--seeds", "-1"), ("--seeds", "0"), ("--seeds", "1000000000000"),
+            ("--workers", "0"), ("--workers", "-3"))),
+        ("case-1 --quick --out there --format pgn", BAD_FORMAT),
+    ],
+    "reproduce": [
+        ("--only case-88 --out r", "study 'case-88' is unknown; did you mean"),
+        ("--only , --out r", "accepted"),
+        ("--out r --beside old", "summary.json: cannot be read: No such file"),
+    ],
+    "import-log": [
+        ("log.csv --out log.csv --overwrite", "found log.csv, the log itself"),
+        ("log.csv --out x.csv --plot x.bmp", "x.bmp: found the ending .bmp"),
+        ("log.csv --out x.csv --plot x", "x: found no ending; accepted: .png"),
+        ("log.csv --out x.csv --plot no/x.png", "there is no folder no"),
+        ("log.csv --out x.csv --rate -5", "--rate: found -5; accepted: above 0"),
+        ("log.csv --out x.csv --rate nan", "--rate: found nan; accepted: above 0"),
+        ("log.csv --out x.csv --from 5", "found no rows from 5 s; accepted: a part"),
+        ("log.csv --out x.csv --unit mm", "accepted: DIMENSION=UNIT, as length=mm"),
+        ("log.csv --out x.csv --every 0", "--every: found '0'; accepted: at least 1"),
+        ("log.csv --out x.csv --every few", "found 'few'; accepted: a whole number"),
+        ("log.csv --out x.csv --from dawn", "--from: found 'dawn'; accepted: a number"),
+        ("empty.csv --out x.csv", "empty.csv: found an empty file; accepted: a log"),
+        ("empty --out x.csv", "empty: found a folder; accepted: a log"),
+        ("none.csv --out x.csv", "none.csv: found no such file; accepted: a log"),
+        ("long.csv --log-format csv", "long.csv"),
+    ],
+    "calibrate hangprinter_4 series.csv": [
+        ("--zero somewhere", "--zero: found 'somewhere'"),
+        ("--zero home --hold-out x", "--hold-out: found 'x'"),
+        ("--bound tracker", "--bound"),
+    ],
+    "identify acrobot_large": [
+        ("empty.csv", "empty log"),
+        ("headed.csv", "header without rows"),
+        ("posed.csv", "tensions: found none"),
+        ("pulled.csv", "poses: found none"),
+        ("nan.csv", "found nan"),
+        ("timeless.csv", "time: found none"),
+    ],
+}  # fmt: skip
+"""By the words that a command begins with: the words that follow, and what is said of them."""
+
+ROWS = [(f"{command} {more}", said) for command, rows in REFUSED.items() for more, *said in rows]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """With files that commands could read and write over, and a robot on two cables."""
+    root = tmp_path_factory.mktemp("refused")
+    for name, text in FILES.items():
+        (root / name).parent.mkdir(exist_ok=True)
+        (root / name).write_text(text)
+    for name in FOLDERS:
+        (root / name).mkdir()
+    hung = yaml.safe_load(robot_text("caroca"))
+    hung["name"], hung["cables"] = "hung", [hung["cables"][0], hung["cables"][4]]
+    del hung["slack_readings"]
+    (root / "hung.yaml").write_text(yaml.safe_dump(hung))
+    return root
+
+
+def held(root):
+    """Contents of all files, by name; of folders nothing."""
+    return {path: path.read_bytes() if path.is_file() else b"" for path in root.rglob("*")}
+
+
+@pytest.mark.parametrize(("line", "words"), ROWS, ids=[line[:70] for line, _ in ROWS])
+def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    before = held(folder)
+    said = refuse(capsys, *shlex.split(line))
+    for word in words:
+        assert word in said
+    assert held(folder) == before
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["tension", "x" * 3000, "--pose", "0,0,0"],
+        ["tension", "acrobot_small", "--pose", "0,0,0.2", "--mass", "x" * 3000],
+        ["simulate", "y" * 3000 + ".yaml"],
+        ["simulate", "--set", "robot=" + "z" * 3000],
+        ["static", "acrobot_small", "--pose", "1," * 3000],
+    ],
+)
+def test_of_long_words_the_middle_is_left_out(words, here, capsys):
+    assert " ... " in refuse(capsys, *words)
+
+
+def test_words_do_not_steer_the_terminal(here, capsys):
+    said = refuse(capsys, "simulate", "\x1b[31mred\u202e\t.yaml")
+    assert "\\x1b[31mred\\u202e\\t.yaml: there is no such scenario file" in said
+    assert said.isprintable()
+
+
+@pytest.mark.parametrize("name", ["../../X", "/X", ".hidden", "a b", "x" * 65])
+def test_names_that_could_be_paths_are_refused(name, here, capsys):
+    text = scenario_file("acrobot_pbvs").read_text().replace("acrobot_pbvs", name)
+    (here / "mine.yaml").write_text(text)
+    code, _, err = run(capsys, "simulate", "mine.yaml", "--camera", "projected")
+    assert (code, "name: found" in err) == (2, True)
+    assert [path.name for path in here.iterdir()] == ["mine.yaml"]
+
+
+def test_all_problems_of_a_file_have_a_line_each(here, capsys):
+    (here / "mine.yaml").write_text("name: x\nrobot: y\ndurration: 3\ntitle: [1]\n")
+    code, _, err = run(capsys, "simulate", "mine.yaml")
+    lines = err.splitlines()
+    assert (code, len(lines) > 4) == (2, True)
+    assert all(line.startswith("cdpr: ") and "mine.yaml:" in line for line in lines)
+    assert "did you mean duration?" in err
+    assert "robot 'y' is unknown" in err
+
+
+def test_a_renderer_or_a_format_that_is_not_installed_is_said_first(here, monkeypatch, capsys):
+    def no_library(name):
+        raise OSError(name)
+
+    monkeypatch.setattr("cdpr_drake.models.rendered_camera.CDLL", no_library)
+    said = refuse(capsys, "simulate", "--duration", "0.2")
+    assert "libegl1" in said
+    assert "--camera projected" in said
+    monkeypatch.setattr("cdpr_drake.analyses.reporting.exported_logs.find_spec", lambda name: None)
+    said = refuse(capsys, "simulate", *QUICK.split(), "--log-format", "mat,parquet")
+    assert "pip install 'cdpr_drake[parquet]'" in said
+    assert not any(here.iterdir())
+
+
+MISSPELT = {
+    "tension caroca --method closed_from": "closed_form",
+    "tension carcoa": "caroca",
+    "static acrobot_large --cable-model elastc": "elastic",
+    "workspace caroca --kind statc": "static",
+    "design acrobot_large --goal surives": "survives",
+    "stability caroca --verdict sampeld": "sampled",
+    "export acrobot_large --format urdff": "urdf",
+    "schema sceanrio": "scenario",
+    "bench tensoin": "tension",
+    "new contoller mine": "controller",
+    "examples lerning": "learning",
+    "study stability-range": "stability-ranges",
+    "simulate acrobot_pvbs": "acrobot_pbvs",
+    "simulate --set camera.kind=projcted": "projected",
+    "check caroac": "caroca",
+    "tensoin": "tension",
+}
+
+
+@pytest.mark.parametrize(("words", "meant"), MISSPELT.items())
+def test_the_name_that_was_meant_is_told(words, meant, here, capsys):
+    code, out, err = run(capsys, *words.split())
+    told = (out + err).lower().replace("'", "")
+    assert code == 2
+    assert f"did you mean {meant}?" in told or f"did you mean {meant}, " in told
+    assert not any(here.iterdir())
+
+
+def test_names_that_are_not_close_are_only_listed():
+    assert accepted_names("xyz", ("pbvs", "ibvs")) == "accepted: pbvs, ibvs"
+    assert accepted_names("pvbs", ("pbvs", "ibvs")) == "did you mean pbvs? accepted: pbvs, ibvs"
+
+
+def raising(problem):
+    """Stands for `app.make_app`."""
+
+    def call(**options):
+        raise problem
+
+    return lambda arguments: call
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        MemoryError(),
+        OverflowError("int too large to convert to float"),
+        ZeroDivisionError("division by zero"),
+        RuntimeError("SpatialInertia: physically invalid:\n mass = nan\n and more"),
+        RecursionError("maximum recursion depth exceeded"),
+        CdprError("long " * 4000),
+        OSError(28, "No space left on device"),
+    ],
+    ids=lambda problem: type(problem).__name__,
+)
+def test_what_drake_or_python_raise_is_one_line(problem, monkeypatch, capsys):
+    monkeypatch.delenv(app.TRACEBACK, raising=False)
+    monkeypatch.setattr(app, "make_app", raising(problem))
+    refuse(capsys, "robots")
+
+
+@pytest.mark.parametrize("mistake", [KeyError("name"), AssertionError(), RuntimeError("Drake")])
+def test_mistakes_of_this_program_can_be_found(mistake, monkeypatch):
+    monkeypatch.delenv(app.TRACEBACK, raising=False)
+    if isinstance(mistake, RuntimeError):  # for which a variable lets it through
+        monkeypatch.setenv(app.TRACEBACK, "1")
+    monkeypatch.setattr(app, "make_app", raising(mistake))
+    with pytest.raises(type(mistake)):
+        app.main(["robots"])
