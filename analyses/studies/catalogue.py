@@ -98,7 +98,6 @@ MODULES = {
     "seen-slack": "seen_slack",
     "calibration": "calibration.study",
     "identification": "identification",
-    "case-1": "case_studies.case_1",
     "case-2": "case_studies.case_2",
     "case-3": "case_studies.case_3",
     "case-4": "case_studies.case_4",

@@ -46,6 +46,7 @@ MOMENTS = {
     "image_mean_px": "mean", "camera_max_m": "largest", "camera_mean_m": "mean",
     "estimate_max_m": "largest", "estimate_max_rad": "largest",
     "estimate_end_m": "end", "estimate_end_rad": "end",
+    "estimate_mean_m": "mean", "estimate_mean_rad": "mean",
 }  # fmt: skip
 """Which number of a curve columns are; a printed number has to be of the same."""
 
@@ -237,7 +238,7 @@ def servo_study(
     *, name: str, title: str, source: str, scenario: str, configurations: Sequence[Configuration],
     assumptions: Sequence[str] = (), units: Mapping[str, str] | None = None,
     figures: Mapping[str, Any] | None = None, finds: Mapping[str, Any] | None = None,
-    tables: Mapping[str, Any] | None = None, **how: Any,
+    tables: Mapping[str, Any] | None = None, laps: Mapping[str, float] | None = None, **how: Any,
 ) -> Study:  # fmt: skip
     """A study whose cases are configurations of a scenario.
 
@@ -245,7 +246,8 @@ def servo_study(
         name, title, source, assumptions, finds, tables: As of `Study`.
         scenario, configurations, how: As of `servo_cases`.
         units: Units in tables of the study's own numbers.
-        figures: Its own, beside those of each experiment; both see projected images alone.
+        figures: Its own, beside those of each experiment; these see projected images alone.
+        laps: Time of a lap of experiments behind an object that runs in laps [s].
     """
     from cdpr_drake.analyses.studies.servo_figures import group_figures
 
@@ -253,7 +255,10 @@ def servo_study(
     groups: dict[str, dict[str, str]] = {}
     for c in configurations:
         groups.setdefault(c.group, {})[c.name] = c.label
-    drawn = {**group_figures(f"{title} ({name})", groups, "stability" in how), **(figures or {})}
+    drawn = {
+        **group_figures(f"{title} ({name})", groups, "stability" in how, laps or {}),
+        **(figures or {}),
+    }
     cameras = {PROJECTED: "projected camera", RENDERED: "rendered images, one run each"}
     return Study(
         name=name,
@@ -268,6 +273,7 @@ def servo_study(
             "stability": how.get("stability"),
         },
         numbers=accuracy,
+        compared=projected,
         moments=MOMENTS,
         tables={
             f"{group or title}; {words}": partial(

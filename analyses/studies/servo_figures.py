@@ -54,6 +54,7 @@ class Shown(NamedTuple):
 
 
 Draw = Callable[[Any, Sequence[Shown]], None]
+Curves = Mapping[str, Array]
 
 
 def shown_of(
@@ -486,12 +487,22 @@ def draw_rank(axes: Any, shown: Sequence[Shown]) -> None:
 
 
 def group_figures(
-    about: str, groups: Mapping[str, Mapping[str, str]], stability: bool
+    about: str,
+    groups: Mapping[str, Mapping[str, str]],
+    stability: bool,
+    laps: Mapping[str, float],
 ) -> dict[str, Callable[..., Figure]]:
-    """Figures of every experiment, by the name of the file."""
+    """Figures of every experiment, by the name of the file.
+
+    Behind an object that runs in laps curves over all of them would be a dark band: figures show
+    the first two laps, or the largest error in each; `laps` has the time of one [s] by experiment.
+    """
     found: dict[str, Callable[..., Figure]] = {}
     for group, names in groups.items():
         of, title = tuple(names), f"{about}\n{group}" if group else about
+        lap = laps.get(group)
+        over_laps = title if lap is None else f"{title}, the first {2.0 * lap:g} s"
+        in_laps = "" if lap is None else f", largest error in each lap of {lap:g} s"
         end = f"_{group.lower().replace(' ', '_')}" if group else ""
 
         def lines(words: str, *panels: Panel, title: str = title) -> Callable[..., Figure]:
@@ -507,14 +518,16 @@ def group_figures(
                 "Path of the object's centre in the image",
                 Panel(IMAGE, of, "path"),
                 Panel(IMAGE_AWAY, of, "distance"),
+                title=over_laps,
             ),
             f"camera_paths{end}": lines(
                 "Path of the camera, Co, in the world frame W",
                 Panel(CAMERA, of, "path", space=True),
                 Panel(CAMERA_AWAY, of, "distance"),
+                title=over_laps,
             ),
             f"pose_estimates{end}": lines(
-                "Estimated pose of the platform against the true one",
+                f"Estimated pose of the platform against the true one{in_laps}",
                 Panel(PLACE_ERROR, of, "place"),
                 Panel(TURN_ERROR, of, "rotation"),
             ),
@@ -546,11 +559,59 @@ def group_figures(
                 found[f"{quantity}{end}"] = partial(cable_layout, words, quantity, of)
         for name, (words, draw, size) in multiples.items():
             found[f"{name}{end}"] = (
-                lambda rows, labels, words=words, draw=draw, size=size, of=of, title=title: (
+                lambda rows, labels, words=words, draw=draw, size=size, of=of, title=over_laps: (
                     small_multiples(f"{words}\n{title}", draw, size, rows, of, labels)
                 )
             )
+        if lap is not None:
+            changes = dict.fromkeys(
+                ("image_paths", "camera_paths", "errors", "cable_velocities"),
+                partial(beginning, seconds=2.0 * lap),
+            ) | {"pose_estimates": partial(largest_by_lap, lap=lap)}
+            for name, change in changes.items():
+                found[f"{name}{end}"] = of_first_runs(found[f"{name}{end}"], change)
     return found
+
+
+def of_first_runs(
+    draw: Callable[..., Figure], change: Callable[[Curves], Curves]
+) -> Callable[..., Figure]:
+    """What draws first runs with changed curves."""
+
+    def draw_changed(rows: Frame, labels: Mapping[str, str]) -> Figure:
+        first = rows.groupby("configuration", sort=False).head(1)
+        return draw(first.assign(arrays=[change(curves) for curves in first["arrays"]]), labels)
+
+    return draw_changed
+
+
+CLOCKS = {
+    "time": ("camera_path", "camera_deviation", "error", "cable_velocities"),
+    "image_time": ("image_path", "image_deviation"),
+}
+"""Curves by their times."""
+
+
+def beginning(curves: Curves, seconds: float) -> Curves:
+    """Curves of `CLOCKS` until a time [s]."""
+    cut = {}
+    for clock, names in CLOCKS.items():
+        early = curves[clock] <= seconds
+        cut |= {name: curves[name][early] for name in (clock, *names)}
+    return {**curves, **cut}
+
+
+def largest_by_lap(curves: Curves, lap: float) -> Curves:
+    """The estimate's largest error in each lap of a time [s], at the middle of the lap."""
+    times = curves["time"]
+    numbers = np.floor((times - times[0]) / lap + 1e-6).astype(int)  # for sums of time steps
+    starts = np.flatnonzero(np.diff(numbers, prepend=-1))
+    ends = np.append(starts[1:], len(times)) - 1
+    largest = {
+        name: np.maximum.reduceat(curves[name], starts)
+        for name in ("estimate_distance", "estimate_angle")
+    }
+    return {**curves, **largest, "time": (times[starts] + times[ends]) / 2.0}
 
 
 def legend_below(drawn: Any, panels: Sequence[Any]) -> None:

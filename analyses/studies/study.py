@@ -107,6 +107,7 @@ class Study:
         figures: What draws the rows, by the name of the file.
         finds: What judges facts that are no comparison, by name.
         moments: Which number of a curve in time a column is: "end", "largest", "mean" or "first".
+        compared: Gives the rows that facts are about; all, if it says nothing.
         numbers: Gives more numbers for JSON.
         parameters: Gives what all cases have in common, for JSON.
         assumptions: What the source leaves open, and what was chosen.
@@ -123,6 +124,7 @@ class Study:
     figures: Mapping[str, Callable[[Frame], Figure]] = field(default_factory=dict)
     finds: Mapping[str, Find] = field(default_factory=dict)
     moments: Mapping[str, str] = field(default_factory=dict)
+    compared: Callable[[Frame], Frame] = lambda rows: rows
     numbers: Callable[[Frame], Mapping[str, Any]] | None = None
     parameters: Callable[[Form], Mapping[str, Any]] = lambda form: {}
     assumptions: Sequence[str] = ()
@@ -374,7 +376,9 @@ class StudyResult:
         elif self.form.quick:
             unjudged = "not judged in the quick form"
         blind = self.interrupted or (self.form.quick and study.coarse)
-        rows = None if blind or not self.records else with_names_of_tables(self.rows)
+        rows = (
+            None if blind or not self.records else with_names_of_tables(study.compared(self.rows))
+        )
         facts = facts_of(study.name, study.facts)
         return judged(facts, rows, study.finds, study.moments, unjudged)
 
@@ -453,8 +457,8 @@ def unit_of(column: str) -> str:
 
 
 STUDIES = {
-    "tension-methods": "tension_methods", "engines": "engines", "case-2": "acrobot_cases",
-    "case-3": "acrobot_cases", "case-4": "caroca_cases",
+    "tension-methods": "tension_methods", "engines": "engines", "case-1": "case_1",
+    "case-2": "acrobot_cases", "case-3": "acrobot_cases", "case-4": "caroca_cases",
     "case-5": "caroca_cases", "case-6": "ibvs_cases", "case-a6": "ibvs_cases",
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
     "case-10": "case_10",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies.case_studies import case_1, case_4, case_5, case_8
+from cdpr_drake.analyses.studies.case_studies import case_4, case_5, case_8
 from cdpr_drake.analyses.studies.case_studies.case_3 import overshoot, turns
 from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
 from cdpr_drake.analyses.studies.framework.study import Form
@@ -23,7 +23,6 @@ from cdpr_drake.systems.robots.settings import simulated_model
 from tests.analyses.studies.made_runs import CASE_STUDIES
 
 ENDS = {
-    "case-1": {"a_1": "converged", "a_3": "converged"},
     "case-2": {"within": "converged", "blind_within": "completed"},
     "case-3": {"turned_16": "converged"},
     "case-4": {"none": "converged"},
@@ -111,7 +110,7 @@ OTHER_CABLES = ("stiffness_", "massless_")
 
 
 def caroca_runs():
-    for study in (case_1.STUDY, case_4.STUDY, case_5.STUDY, case_8.STUDY, case_10.STUDY):
+    for study in (case_4.STUDY, case_5.STUDY, case_8.STUDY, case_10.STUDY):
         plan = study.cases
         for one in plan.configurations:
             scenario = one.scenario or plan.scenario
@@ -132,7 +131,7 @@ def test_every_case_on_caroca_has_the_same_cables():
     for study, scenario, changes, name in caroca_runs():
         assert cables_of(load_scenario(scenario, changes)) == COMMON, (study, name)
         studies.add(study)
-    assert studies == {"case-1", "case-4", "case-5", "case-8", "case-10"}
+    assert studies == {"case-4", "case-5", "case-8", "case-10"}
 
 
 @pytest.mark.parametrize(

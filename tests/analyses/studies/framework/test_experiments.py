@@ -6,7 +6,7 @@ import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from cdpr_drake.analyses.studies.case_studies import case_1, case_1_ends
+from cdpr_drake.analyses.studies import case_1
 from cdpr_drake.analyses.studies.framework.experiments import (
     POINT_ERROR,
     as_transform,
@@ -71,9 +71,5 @@ def test_every_case_with_slack_has_the_same(study):
 
 
 def test_case_1_and_fusion_have_the_same():
-    assert set(case_1_ends.POINTS) == set(wrong_points())
+    assert set(case_1.POINTS) == set(wrong_points())
     assert set(wrong_points()) <= set(slack_trials.WRONG)
-    following = [case for case in case_1.STUDY.plan(Form()) if case.keys["group"] == case_1.MOVING]
-    assert following
-    for case in following:
-        assert set(wrong_points()) <= set(case.changes), case.name

@@ -1,6 +1,5 @@
 """Figures in the layout of published ones: what they are of, and how they are filled."""
 
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,8 +7,6 @@ import pytest
 
 from cdpr_drake.analyses.studies.framework.case_figures import (
     bar_figure,
-    group_figure,
-    largest_of_each,
     shown_of,
     small_multiples,
 )
@@ -23,7 +20,6 @@ from cdpr_drake.analyses.studies.framework.case_panels import bars, metric
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.palette import nth_look
 from tests.analyses.studies.made_runs import CASE_STUDIES, made_run, made_runs
-from tests.figure_faults import figure_faults
 
 CASES = {study.name: study.cases for study in CASE_STUDIES}
 CASE = CASES["case-5"]
@@ -124,57 +120,3 @@ def test_a_bar_alone_does_not_fill_its_axes(runs):
     (axes,) = figure.axes
     (bar,) = axes.patches
     assert bar.get_width() < 0.25 * np.ptp(axes.get_xlim())
-
-
-LAPS = 15
-
-
-@pytest.mark.parametrize(
-    "name", ["errors", "cable_velocities", "image_paths", "camera_paths", "pose_estimates"]
-)
-def test_laps_behind_an_object_that_moves_are_no_dark_band(name):
-    """Fifteen laps lay on each other, and the distance was one from a line that nobody follows."""
-    time = np.linspace(0.0, 16.0 * LAPS, 50 * LAPS, endpoint=False)
-    turn = 2.0 * np.pi * LAPS * time / time[-1]
-    around = np.transpose([np.cos(turn), np.sin(turn), 0.0 * turn])
-    goal = np.zeros((2, 3))
-    made = made_run(
-        "m_7", summary={"robot": "planar"}, features=["x_m", "y_m", "z_m"], time=time,
-        image_time=time, image_size=np.array([1600.0, 1200.0]), image_max_px=None,
-        image_path=800.0 + 100.0 * around[:, :2], image_line=800.0 + goal[:, :2],
-        image_deviation=np.abs(around[:, 0]), camera_path=around, camera_line=goal,
-        camera_deviation=np.abs(around[:, 0]), error=around,
-        cable_velocities=np.hstack([around, around[:, :1]]),
-        estimate_distance=time * (turn % 0.7), estimate_angle=time,
-    )  # fmt: skip
-    plan = CASES["case-1"]
-    ((group, lap),) = plan.laps_s.items()
-    assert group in plan.groups()
-    figure = group_figure(plan, group, name, made_runs([made]))
-    assert figure_faults(figure) == []
-    over_time = [axes for axes in figure.axes if axes.get_xlabel() == "time [s]"]
-    whole = name == "pose_estimates"  # what accumulates is seen over all laps
-    for axes in over_time:
-        last = max(float(np.max(line.get_xdata())) for line in axes.lines)
-        assert last == pytest.approx(time[-1] - 0.5 * lap if whole else 2.0 * lap, abs=time[1])
-        assert not whole or len(axes.lines[0].get_ydata()) == LAPS
-    assert ("the first 32 s" in figure.get_suptitle()) is not whole
-    assert ("in each lap of 16 s" in figure.get_suptitle()) is whole
-    if name in ("image_paths", "camera_paths"):
-        (axes,) = over_time
-        assert axes.get_ylabel().startswith("distance from the desired point")
-        np.testing.assert_allclose(axes.lines[0].get_ydata(), axes.lines[0].get_ydata()[0])
-        words = [text.get_text() for text in figure.legends[0].get_texts()]
-        assert "straight line" not in words
-    # A plan that says nothing shows all.
-    every = group_figure(replace(plan, laps_s={}), group, name, made_runs([made]))
-    assert "the first" not in every.get_suptitle()
-    assert "in each lap" not in every.get_suptitle()
-
-
-def test_the_largest_of_each_lap():
-    times, largest = largest_of_each(
-        np.array([0.0, 1.0, 2.0, 2.9, 3.0, 4.0]), np.array([1.0, 5.0, 2.0, 3.0, 4.0, 0.0]), 2.0
-    )
-    np.testing.assert_allclose(times, [0.5, 2.5, 4.0])
-    np.testing.assert_array_equal(largest, [5.0, 4.0, 0.0])
