@@ -85,7 +85,6 @@ MODULES = {
     "scenarios": "scenarios",
     "planning": "planning.study",
     "proven-paths": "proven_paths.study",
-    "mobile-robot": "mobile_robot.study",
     "pick-and-place": "pick_and_place",
     "fusion": "fusion.study",
     "schemes": "schemes.study",

@@ -461,7 +461,7 @@ STUDIES = {
     "case-2": "acrobot_cases", "case-3": "acrobot_cases", "case-4": "caroca_cases",
     "case-5": "caroca_cases", "case-6": "ibvs_cases", "case-a6": "ibvs_cases",
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
-    "case-10": "case_10",
+    "case-10": "case_10", "mobile-robot": "mobile_robot",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

@@ -356,12 +356,6 @@ def sets_of(name):
 
 NOT_MADE = {
     "schemes": {"image_far"},
-    "case-1": {"returns", "turns_repeat"},
-    "mobile-robot": {
-        "drift", "lengths", "corrected", "slack", "same_path", "fails_far_off", "spikes_by_slack",
-        "worse_and_worse", "corners", "noticed_early", "first_laps", "underactuated", "takes_part",
-        "same_tensions", "only_the_first",
-    },
     "case-9": {"eta", "polygon", "outward", "residuals", "sensor_accuracy", "stable"},
     "tension-methods": {"closed_form_steady", "unstable"},
     "stability-recipes": {"rising"},
