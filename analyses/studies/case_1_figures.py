@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.facts import MissingRuns
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.servo_figures import (
     DEG,
     IMAGE,
@@ -90,14 +90,14 @@ def goal_errors(rows: Frame) -> dict[str, Frame]:
     """Runs to the same goal by controller.
 
     Raises:
-        MissingRuns: One of the controllers was not run.
+        NothingToDraw: One of the controllers was not run.
     """
     runs = {
         "open loop": rows[rows["configuration"] == "g_blind"],
         "PBVS": rows[rows["configuration"].isin(names("g", "123456"))],
     }
     if not all(map(len, runs.values())):
-        raise MissingRuns("one goal")
+        raise NothingToDraw
     return runs
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.studies.facts import MissingRuns
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import (
@@ -51,10 +51,10 @@ def of_views(rows: Frame) -> Frame:
 
 
 def by_words(rows: Frame) -> dict[str, Frame]:
-    """Runs with a known tag, as chosen, by words; MissingRuns if there are none."""
+    """Runs with a known tag, as chosen, by words; NothingToDraw if there are none."""
     runs = {words: rows[rows["configuration"] == name] for name, words in WORDS.items()}
     if not any(map(len, runs.values())):
-        raise MissingRuns(", ".join(WORDS))
+        raise NothingToDraw
     return {words: some for words, some in runs.items() if len(some)}
 
 
@@ -62,7 +62,7 @@ def first_run(rows: Frame, name: str) -> tuple[Mapping[str, Array], int]:
     """Curves of a configuration's first run, and its last whole lap."""
     runs = rows[rows["configuration"] == name]
     if not len(runs):
-        raise MissingRuns(name)
+        raise NothingToDraw
     return runs["arrays"].iloc[0], max(int(runs["laps_done"].iloc[0] + 1e-9), 1)
 
 
@@ -206,7 +206,7 @@ def choices_figure(rows: Frame) -> Figure:
     """Laps until the end under other choices of what is not printed, every run."""
     rows = rows[~rows["choice"].str.startswith("view")]
     if (rows["choice"] == AS_CHOSEN).all():
-        raise MissingRuns("other choices")
+        raise NothingToDraw
     title = "What the thesis does not print, at three values each"
     figure, panels = new_figure(2, 1, (10.0, 13.0), title)
     for axes, ways, words in (
@@ -233,7 +233,7 @@ def views_figure(rows: Frame) -> Figure:
     """Laps until the end over how far the tag may drift in the image, by estimator."""
     rows = of_views(rows)
     if (rows["choice"] == AS_CHOSEN).all():
-        raise MissingRuns("other views")
+        raise NothingToDraw
     figure, axes = new_figure(1, 1, (9.0, 6.0), "How long the tag is followed, by its view")
     for way, runs in rows.groupby("way", sort=False):
         look, number = nth_look(VIEWED.index(way)), runs["estimator"].iloc[0]

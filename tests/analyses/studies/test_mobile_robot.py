@@ -23,6 +23,7 @@ from cdpr_drake.analyses.studies.study import Form
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
+from tests.figure_faults import figure_faults
 
 CASES = list(STUDY.cases(Form()))
 SHAPE = {
@@ -114,6 +115,13 @@ def test_views_without_an_effect_are_not_confirmed():
             runs[case.keys["configuration"]] = made_up(30, 12)
     held, _ = STUDY.finds["view_decides"](rows_of(runs))
     assert held == [True, False]  # the laps agree, and no view changes them
+
+
+@pytest.mark.parametrize(("name", "panels"), [("choices", 2), ("views", 1)])
+def test_figures_of_what_the_quick_form_has_not(name, panels):
+    figure = STUDY.figures[name](rows_of(printed()))
+    assert figure_faults(figure) == []
+    assert len(figure.axes) == panels
 
 
 def test_every_configuration_is_a_scenario_that_is_accepted():
