@@ -564,6 +564,7 @@ def group_figures(
                 )
             )
         if lap is not None:
+            del found[f"deviations{end}"]  # behind an object that moves there is no straight line
             changes = dict.fromkeys(
                 ("image_paths", "camera_paths", "errors", "cable_velocities"),
                 partial(beginning, seconds=2.0 * lap),
@@ -594,7 +595,7 @@ CLOCKS = {
 
 def beginning(curves: Curves, seconds: float) -> Curves:
     """Curves of `CLOCKS` until a time [s]."""
-    cut = {}
+    cut: dict[str, Array] = {}
     for clock, names in CLOCKS.items():
         early = curves[clock] <= seconds
         cut |= {name: curves[name][early] for name in (clock, *names)}
