@@ -19,6 +19,7 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.version import __version__
 
@@ -171,7 +172,10 @@ class Folder:
         writers: Mapping[str, Callable[[Path], object]],
         stop: Callable[[], bool] = lambda: False,
     ) -> dict[str, str]:
-        """Writes files by name, one of which spoils no other; returns why some were not written."""
+        """Writes files by name, one of which spoils no other; returns why some were not written.
+
+        A figure that raises NothingToDraw is left out.
+        """
         failed: dict[str, str] = {}
         for name, write in writers.items():
             if stop():
@@ -180,6 +184,8 @@ class Folder:
             try:
                 with self.file(name) as part:
                     write(part)
+            except NothingToDraw:
+                continue
             except Exception as problem:  # whatever a figure stumbles over
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
         return failed

@@ -466,7 +466,7 @@ def laps_against_print(rows: Frame, of: str, count: int) -> Frame:
     return table
 
 
-def good(shares: Frame) -> Frame:
+def as_printed(shares: Frame) -> Frame:
     """True if laps are within a factor of two of the printed ones."""
     return (shares >= 0.5) & (shares <= 2.0)
 
@@ -484,7 +484,7 @@ def lengths_depend(rows: Frame) -> tuple[list[bool], str]:
     shares = laps_against_print(runs, "choice", 1 + len(VARIED))
     longest = shares["estimator cable_lengths"]
     changed = (longest != longest[AS_CHOSEN]).any()
-    held = [good(shares).all(axis=1).any(), good(shares).any(axis=None) or changed]
+    held = [as_printed(shares).all(axis=1).any(), as_printed(shares).any(axis=None) or changed]
     return held, laps_by_configuration(runs)
 
 
@@ -494,7 +494,7 @@ def view_decides(rows: Frame) -> tuple[list[bool], str]:
     runs = of_views(rows)
     shares = laps_against_print(runs, "margin_m", 1 + len(VIEWS))
     first = list(shares[VIEWED[0]])
-    held = [good(shares).all(axis=1).any(), first == sorted(first) and first[0] < first[-1]]
+    held = [as_printed(shares).all(axis=1).any(), first == sorted(first) and first[0] < first[-1]]
     return held, laps_by_configuration(runs.sort_values("margin_m", kind="stable"))
 
 

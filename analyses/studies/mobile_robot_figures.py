@@ -55,7 +55,7 @@ def by_words(rows: Frame) -> dict[str, Frame]:
     runs = {words: rows[rows["configuration"] == name] for name, words in WORDS.items()}
     if not any(map(len, runs.values())):
         raise NothingToDraw
-    return {words: some for words, some in runs.items() if len(some)}
+    return {words: group for words, group in runs.items() if len(group)}
 
 
 def first_run(rows: Frame, name: str) -> tuple[Mapping[str, Array], int]:
@@ -141,9 +141,9 @@ def draw_paths(axes: Any, rows: Frame, name: str, words: str = "", look: int = 0
     curves, last = first_run(rows, name)
     laps = dict(zip((*SHOWN, last), curves["paths_m"], strict=True))
     for number, (lap, path) in enumerate(sorted(laps.items())):
-        there = np.all(np.isfinite(path), axis=1)
-        if np.any(there):
-            closed = path[[*range(PHASES), 0]] if np.all(there) else path[there]
+        finite = np.all(np.isfinite(path), axis=1)
+        if np.any(finite):
+            closed = path[[*range(PHASES), 0]] if np.all(finite) else path[finite]
             mark = nth_look(look + number)
             axes.plot(
                 *closed[:, :2].T, **line_style(mark), label=f"{words}lap {lap}", marker=mark.marker,

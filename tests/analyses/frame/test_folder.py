@@ -22,6 +22,7 @@ from cdpr_drake.analyses.frame.folder import (
     is_locked,
     read_marker,
 )
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
 
 WANTED = {"robot": "planar", "steps": [1, 2], "seed": 1}
@@ -181,9 +182,12 @@ def test_one_figure_that_fails_costs_no_other(tmp_path):
     def fail(path):
         raise ValueError("no data\nat all")
 
+    def left_out(path):
+        raise NothingToDraw
+
     with Folder(tmp_path / "run", WANTED) as folder:
         writers = {"a.txt": lambda path: path.write_text("a"), "b.txt": fail}
-        assert folder.write_all(writers) == {"b.txt": "no data"}
+        assert folder.write_all({**writers, "c.txt": left_out}) == {"b.txt": "no data"}
         assert folder.write_all(writers, stop=lambda: True).keys() == writers.keys()
     assert "b.txt" not in names(tmp_path / "run")
 
