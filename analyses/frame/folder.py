@@ -29,6 +29,10 @@ LONGEST_VALUE = 60
 """Longer JSON values are not quoted in refusals [characters]."""
 
 
+class NothingToDraw(Exception):
+    """There are no data yet for a figure; it is left out, and that is no failure."""
+
+
 class Folder:
     """A results folder that this process writes inside its `with` block.
 
@@ -171,7 +175,10 @@ class Folder:
         writers: Mapping[str, Callable[[Path], object]],
         stop: Callable[[], bool] = lambda: False,
     ) -> dict[str, str]:
-        """Writes files by name, one of which spoils no other; returns why some were not written."""
+        """Writes files by name, one of which spoils no other; returns why some were not written.
+
+        A figure for which there are no data yet is left out.
+        """
         failed: dict[str, str] = {}
         for name, write in writers.items():
             if stop():
@@ -180,6 +187,8 @@ class Folder:
             try:
                 with self.file(name) as part:
                     write(part)
+            except NothingToDraw:
+                continue
             except Exception as problem:  # whatever a figure stumbles over
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
         return failed
