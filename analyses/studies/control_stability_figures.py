@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -205,7 +205,7 @@ def reason_table(rows: Frame) -> Frame:
     ])  # fmt: skip
 
 
-TABLES_OF_ROWS = {
+TABLES_OF_ROWS: Mapping[str, Callable[[Frame], Frame]] = {
     **{
         f"Table {table.title}, share of the full workspace in per cent": partial(
             table_of, name=table.name

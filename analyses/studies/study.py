@@ -37,7 +37,7 @@ from cdpr_drake.schema.typed_yaml import closest
 
 Frame = pd.DataFrame
 Row = Mapping[str, Any]
-Call = partial[Row]
+Call = partial[Any]
 
 ROWS, ARRAYS, RESULTS = "rows.jsonl", "arrays", "results.json"
 """Files of a study's folder: a line each row, arrays of rows by digest, and what came out."""
