@@ -73,8 +73,9 @@ def by_distance(rows: Frame) -> dict[str, Frame]:
 
 def table_of(rows: Frame, name: str) -> Frame:
     """A printed table beside what was computed."""
-    columns = ["bound", "value", "printed_percent", *(f"{one}_percent" for one in VERDICTS)]
-    return printed_rows(rows, "verdicts", name)[columns].round(1)
+    shares = ["printed_percent", *(f"{verdict}_percent" for verdict in VERDICTS)]
+    repeated = printed_rows(rows, "verdicts", name)
+    return repeated[["bound", "value", *shares]].round(dict.fromkeys(shares, 1))
 
 
 def verdict_means(rows: Frame) -> Frame:
