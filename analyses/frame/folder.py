@@ -30,6 +30,10 @@ LONGEST_VALUE = 60
 """Longer JSON values are not quoted in refusals [characters]."""
 
 
+class NothingToDraw(Exception):
+    """There are no data yet for a figure; it is left out, and that is no failure."""
+
+
 class Folder:
     """A results folder that this process writes inside its `with` block.
 

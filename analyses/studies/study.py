@@ -37,7 +37,7 @@ from cdpr_drake.schema.typed_yaml import closest
 
 Frame = pd.DataFrame
 Row = Mapping[str, Any]
-Call = partial[Row]
+Call = partial[Any]
 
 ROWS, ARRAYS, RESULTS = "rows.jsonl", "arrays", "results.json"
 """Files of a study's folder: a line each row, arrays of rows by digest, and what came out."""
@@ -369,7 +369,7 @@ class StudyResult:
 
     @cached_property
     def statements(self) -> list[dict[str, Any]]:
-        """Facts with verdicts."""
+        """Facts with verdicts; a recipe that is not the study's own says nothing of them."""
         study, unjudged = self.study, ""
         if self.interrupted:
             unjudged = "interrupted"
@@ -379,17 +379,17 @@ class StudyResult:
         rows = (
             None if blind or not self.records else with_names_of_tables(study.compared(self.rows))
         )
-        facts = facts_of(study.name, study.facts)
+        facts = [] if self.form.recipe else facts_of(study.name, study.facts)
         return judged(facts, rows, study.finds, study.moments, unjudged)
 
     def tables(self) -> dict[str, Frame]:
         """Tables by title, that of the facts last; those whose rows lack are left out."""
-        found = {}
+        found, form = {}, self.form
         for title, make in self.study.tables.items():
             try:
                 found[title] = make(self.rows)
             except (MissingRuns, KeyError):
-                if not self.interrupted and not self.form.quick:
+                if not (self.interrupted or form.quick or form.recipe):
                     raise
         if self.statements:
             columns = ["words", "printed", "found", "verdict", "rule", "why"]
@@ -462,6 +462,8 @@ STUDIES = {
     "case-5": "caroca_cases", "case-6": "ibvs_cases", "case-a6": "ibvs_cases",
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
     "case-10": "case_10", "mobile-robot": "mobile_robot",
+    "control-stability": "control_stability",
+    "stability-shapes": "stability_shapes", "stability-closed-loop": "closed_loops",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

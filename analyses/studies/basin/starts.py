@@ -52,7 +52,7 @@ SETTINGS = (
     f"log_rate={LOG_RATE}",
     "integration.loop=compiled",
 )
-"""What differs from the scenario acrobot_pbvs; as in the studies stability-closed-loop the tag lies
+"""What differs from the scenario acrobot_pbvs; as in the study stability-closed-loop the tag lies
 in the middle of the floor, and images have no noise, so that errors of the model are all."""
 
 LOWEST = 0.15

@@ -3,7 +3,7 @@
 The thesis does not say how it drew its perturbations. These assumptions, found by trying with rows
 at hand that `recipe_choices` names, come closest; among `recipe_variants` they are `one-exchange`.
 They are the same for every table. What they give on all rows, and on those that were not in sight,
-stands in the results of `cdpr study stability-recipes`.
+stands in the results of `cdpr study control-stability`.
 
 - platform unrotated; the camera faces down, 0.08 m above the origin of ACROBOT's platforms and
   0.2 m above that of CAROCA's; on the planar robot it is at the platform's origin;

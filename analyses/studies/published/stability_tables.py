@@ -19,8 +19,11 @@ Printed numbers that contradict each other; the data are those of the tables:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 
 @dataclass(frozen=True)
@@ -96,3 +99,97 @@ def _tables() -> tuple[PublishedTable, ...]:
 
 TABLES = _tables()
 """All tables, in their order."""
+
+BY_NAME = {table.name: table for table in TABLES}
+
+DIGIT = 0.15
+"""Printed shares that differ by less may differ in their last digit alone [points]."""
+
+LENGTH_ROUNDING = 1e-9
+"""Lengths that differ by less are the same [m]."""
+
+
+class ShiftPair(NamedTuple):
+    """A printed row of exit points beside one of the platform's place.
+
+    A common shift of all exit points is a shift of the platform the other way. At the baseline of
+    the other bounds the errors of r_A = r and a common shift by r are therefore those of
+    r_bp = r + 0.025 m.
+
+    Attributes:
+        table: Name of their table.
+        r_A: Bound on exit points of the first row [m].
+        r_bp: Bound on the platform's place of the second [m].
+        first: Printed share of the first [%].
+        second: Printed share of the second [%].
+    """
+
+    table: str
+    r_A: float
+    r_bp: float
+    first: float
+    second: float
+
+    @property
+    def more(self) -> bool:
+        """True if the first leaves more, by more than the last digit."""
+        return self.first > self.second + DIGIT
+
+    @property
+    def less(self) -> bool:
+        """True if the first leaves less, by more than the last digit."""
+        return self.first < self.second - DIGIT
+
+
+def nested_pairs(tables: Sequence[PublishedTable] = TABLES) -> list[ShiftPair]:
+    """For each printed r_A the largest printed r_bp whose errors it contains.
+
+    By (3.27) and the spheres of errors of 3.3.1 the row of r_A cannot leave more.
+    """
+    return [pair for table in tables for pair in _pairs(table, within=True)]
+
+
+def covering_pairs(tables: Sequence[PublishedTable] = TABLES) -> list[ShiftPair]:
+    """For each printed r_A the smallest printed r_bp whose errors contain a common shift by r_A.
+
+    A row of r_A that leaves less has exit points that are not wrong in common.
+    """
+    return [pair for table in tables for pair in _pairs(table, within=False)]
+
+
+def _pairs(table: PublishedTable, within: bool) -> list[ShiftPair]:
+    spare = BASELINE_VALUES["r_bp"] - BASELINE_VALUES["r_A"]
+    choose, sign = (max, 1.0) if within else (min, -1.0)
+    shares, pairs = table.rows.get("r_bp", {}), []
+    for r_A, share in table.rows.get("r_A", {}).items():
+        fitting = [R for R in shares if sign * (R - r_A - spare) <= LENGTH_ROUNDING]
+        if fitting:
+            r_bp = choose(fitting)
+            pairs.append(ShiftPair(table.name, r_A, r_bp, share, shares[r_bp]))
+    return pairs
+
+
+class Step(NamedTuple):
+    """A printed row and the next larger value of the same bound, with their shares [%]."""
+
+    table: str
+    bound: str
+    low: float
+    high: float
+    first: float
+    second: float
+
+    @property
+    def rises(self) -> bool:
+        """True if the larger bound leaves more, by more than the last digit; (3.27) forbids it."""
+        return self.second > self.first + DIGIT
+
+
+def steps_of(tables: Sequence[PublishedTable] = TABLES) -> list[Step]:
+    """Steps from every printed row to the next larger value of its bound."""
+    return [
+        Step(table.name, bound, low, high, shares[low], shares[high])
+        for table in tables
+        for bound, shares in table.rows.items()
+        for low, high in pairwise(sorted(shares))
+    ]

@@ -157,7 +157,6 @@ UNNAMED = {
         "two_programs", "homing_tensions", "border_tensions", "equally_tensed", "two_cables_more",
         "polygon_shrinks", "keeps_limits", "pushes",
     },
-    "stability-shapes": {"combinations"},
     "pick-and-place": {"one_camera_fails"},
     "case-9": {"sensor_accuracy"},
 }  # fmt: skip
@@ -358,14 +357,13 @@ NOT_MADE = {
     "schemes": {"image_far"},
     "case-9": {"eta", "polygon", "outward", "residuals", "sensor_accuracy", "stable"},
     "tension-methods": {"closed_form_steady", "unstable"},
-    "stability-recipes": {"rising"},
 }  # fmt: skip
 """Checks for which no rows are made here, by study: they ask for poses of a robot, traces of laps,
 tables within a row, or whether platforms are lost, or judge printed numbers alone. Tests of their
 own make them fail."""
 
 OTHER_ROWS = (
-    "worked-examples", "stability-shapes", "workspaces", "pick-and-place",
+    "worked-examples", "workspaces", "pick-and-place",
 )  # fmt: skip
 """Studies whose rows are solids, polygons, lists and counts; their own tests make each check
 fail."""

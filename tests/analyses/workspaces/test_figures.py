@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import matplotlib.colors
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.colors import to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from cdpr_drake.analyses.studies.control_stability.figures import table_figure
-from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.summary import COARSE, FULL
-from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.analyses.studies.control_stability_figures import table_figure
+from cdpr_drake.analyses.studies.published.stability_tables import BY_NAME
 from cdpr_drake.analyses.visualization.replay import robot_picture
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,
@@ -190,16 +189,15 @@ def test_curves_of_two_bounds_have_colours_that_are_far_from_each_other():
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
-    table = next(table for table in TABLES if table.name == "A.8")
     rows = [
-        Run(
-            f"{bound}={value}", None,
-            {"table": "A.8", "bound": bound, "value": value, "grid": COARSE if quick else FULL},
-            {f"{verdict}_percent": 50.0 for verdict in VERDICTS}, {"sampled_percent": "60"},
-        )
+        {
+            "question": "verdicts", "table": "A.8", "bound": bound, "value": value,
+            "grid": "coarse" if quick else "full", "printed_percent": 60.0,
+            **{f"{verdict}_percent": 50.0 for verdict in VERDICTS},
+        }
         for bound, value in (("r_bp", 0.05), ("r_A", 0.01), ("r_A", 0.03))
     ]  # fmt: skip
-    figure = table_figure(Runs(rows), table)
+    figure = table_figure(pd.DataFrame(rows), BY_NAME["A.8"])
     assert figure_faults(figure) == []
     assert ("not to be compared" in figure.get_suptitle()) == quick
     assert "3 of 44 printed rows" in figure.get_suptitle()

@@ -1,8 +1,21 @@
 """All rows of the servoing thesis' tables A.8 to A.18, as printed."""
 
-import pytest
+from dataclasses import replace
 
-from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, TABLES
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from cdpr_drake.analyses.studies.published.stability_tables import (
+    BASELINE_VALUES,
+    BY_NAME,
+    TABLES,
+    covering_pairs,
+    nested_pairs,
+    steps_of,
+)
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.models.robot_loader import load_robot
 
 COUNTS = {
     "A.8": 44, "A.9": 40, "A.10": 42, "A.11": 39, "A.12": 51, "A.13": 36, "A.14": 38, "A.15": 45,
@@ -82,3 +95,25 @@ def test_shares_are_those_of_the_printed_volumes():
                 if abs(100.0 * volume / table.full - share) > 0.05 + 0.05 / table.full + 1e-9:
                     otherwise.add((table.name, name, value))
     assert otherwise == ROUNDED_OTHERWISE
+
+
+def test_an_error_of_exit_points_contains_a_shift_of_the_platform():
+    bad = {(pair.table, pair.r_A, pair.r_bp) for pair in nested_pairs() if pair.more}
+    assert bad == {("A.15", 0.05, 0.05), ("A.18", 0.3, 0.3)}
+    # With points that share one shift the same rows are the same sets, up to the draws.
+    cables = load_robot("acrobot_large").cable_set().without_pulleys()
+    shift = np.array([0.02, -0.01, 0.03])
+    exits = replace(cables, p_WA=cables.p_WA - shift[:, np.newaxis])
+    np.testing.assert_allclose(
+        cable_jacobian(RigidTransform(shift), cables), cable_jacobian(RigidTransform(), exits)
+    )
+
+
+def test_printed_rows_that_a_common_shift_of_exit_points_cannot_give():
+    less = [(pair.table, pair.r_A, pair.r_bp) for pair in covering_pairs() if pair.less]
+    assert [pair for pair in less if pair[0] == "A.15"] == [
+        ("A.15", 0.2, 0.25), ("A.15", 0.3, 0.5)
+    ]  # fmt: skip
+    assert ("A.12", 0.2, 0.25) in less
+    upwards = replace(BY_NAME["A.11"], rows={"r_bp": {0.1: 30.0, 0.03: 97.0, 0.2: 30.5}})
+    assert [(step.low, step.high) for step in steps_of([upwards]) if step.rises] == [(0.1, 0.2)]

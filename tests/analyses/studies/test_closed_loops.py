@@ -3,15 +3,28 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.simulation.run_stability import stability_along
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.analyses.studies.closed_loops.kinematic_servo import REACHED, STEP, kinematic_path
-from cdpr_drake.analyses.studies.closed_loops.loops import SETTINGS as LOOP_SETTINGS
-from cdpr_drake.analyses.studies.closed_loops.loops import loop_setup, perturbation_of
+from cdpr_drake.analyses.studies.closed_loops import (
+    MANAGED,
+    MODES,
+    PLAIN,
+    REACHED,
+    STEP,
+    STUDY,
+    closed_loop,
+    kinematic_path,
+    loop_scenario,
+    perturbation_of,
+    stable_starts,
+)
+from cdpr_drake.analyses.studies.closed_loops import SETTINGS as LOOP_SETTINGS
+from cdpr_drake.analyses.studies.facts import facts_of, judged
 from cdpr_drake.analyses.studies.framework.servo_models import (
     Perturbation,
     perturbed_scenario,
@@ -22,7 +35,7 @@ from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.stability.desired_view import FixedObject
 from cdpr_drake.stability.perturbation_bounds import BASELINE, vector_size
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
-from cdpr_drake.stability.stability_case import StabilityCase
+from cdpr_drake.stability.stability_case import SCHEMES, StabilityCase
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -154,10 +167,9 @@ def robots(tmp_path_factory):
 @pytest.fixture(scope="module")
 def worst():
     """The worst errors that a search finds at the start, as in the study."""
-    setup = loop_setup(SCHEME)
-    found = perturbation_of(setup, pose_row(HANGING), worst=True)
+    found = perturbation_of(SCHEME, pose_row(HANGING), worst=True)
     # Stable, says the criterion, which takes every cable as taut.
-    assert perturbed_servo(setup.scenario, found).margin(HANGING) > 0.0
+    assert perturbed_servo(loop_scenario(SCHEME), found).margin(HANGING) > 0.0
     return found
 
 
@@ -183,3 +195,41 @@ def test_whether_a_loop_with_slack_arrives(robots, worst, mass, managed, expecte
         assert along.underactuated_time() < 2.0
     if taut == 5:
         assert along.underactuated_time() > 0.5 * LONG_ENOUGH
+
+
+def test_starts_lie_in_the_workspace_and_loops_from_them_converge():
+    starts, counts = stable_starts("pbvs", 2)
+    np.testing.assert_array_equal(starts, stable_starts("pbvs", 3)[0][:2])
+    assert counts["drawn"] >= 2 + sum(counts[name] for name in ("not_held", "not_seen"))
+    row = closed_loop("pbvs", "kinematic", starts[0].tolist())
+    assert (row["outcome"], row["error_growth"], row["error_peak"]) == ("converged", 0.0, 1.0)
+    shifted = closed_loop("pbvs", "shifted", starts[0].tolist())
+    assert shifted["estimate_error_m"] == pytest.approx(0.03)
+    assert shifted["estimate_error_rad"] == pytest.approx(np.radians(3.0))
+
+
+def verdicts(modes=(), **ends):
+    """Facts on loops that converge, but for the first of PBVS in some modes."""
+    usual = {"outcome": "converged", "poses_outside_z": 0, "taut_at_end": 8}
+    rows = [
+        {"scheme": scheme, "mode": mode, "seed": seed, "start_pose": [0.0] * 7, **usual}
+        | (ends if mode in modes and (scheme, seed) == ("pbvs", 0) else {})
+        for scheme in SCHEMES
+        for mode in MODES
+        for seed in range(2)
+    ]
+    found = judged(facts_of(STUDY.name), pd.DataFrame(rows), STUDY.finds, {}, "")
+    return {one["name"]: one for one in found}
+
+
+def test_a_loop_has_to_arrive_and_hanging_ones_by_managed_tensions():
+    hangs = {"outcome": "timeout", "taut_at_end": 5}
+    assert verdicts()["reached"]["verdict"] == "confirmed"
+    assert verdicts((MANAGED,), **hangs)["reached"]["verdict"] == "confirmed"  # not about it
+    lost = verdicts(("shifted",), outcome="target_lost")["reached"]
+    assert (lost["verdict"], lost["held"], lost["of"]) == ("in part", 3, 4)
+    assert verdicts()["managed"]["verdict"] == "not judged"  # no loop hangs
+    arrives, stays = verdicts((PLAIN,), **hangs), verdicts((PLAIN, MANAGED), **hangs)
+    assert arrives["managed"]["verdict"] == "confirmed"
+    assert "pbvs start 0 at (0.00, 0.00, 0.00) m on 5 cables" in arrives["managed"]["found"]
+    assert stays["managed"]["verdict"] == "not confirmed"
