@@ -50,6 +50,7 @@ UNIT_WORDS = {
 
 OVER: Mapping[str, Callable[[Any], Any]] = {
     "mean": np.mean, "median": np.median, "max": np.max, "min": np.min, "sum": np.sum,
+    "rms": lambda values: np.sqrt(np.mean(np.square(values))),
     "drop": lambda values: values[0] - values[-1],
 }  # fmt: skip
 """What makes one number of several rows."""
@@ -99,7 +100,7 @@ class Selection(_Data):
     rows: str = ""
     by: dict[str, list[Any]] = {}
     paired: list[str] = []
-    over: Literal["mean", "median", "max", "min", "sum", "drop", "each"] = "mean"
+    over: Literal["mean", "median", "max", "min", "sum", "rms", "drop", "each"] = "mean"
     across: Literal["", "mean", "max", "min"] = ""
 
     def values(self, table: Frame) -> dict[Any, float]:

@@ -29,7 +29,14 @@ from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.studies.facts import Find, MissingRuns, facts_of, judged, scorecard
+from cdpr_drake.analyses.studies.facts import (
+    FACTORS,
+    Find,
+    MissingRuns,
+    facts_of,
+    judged,
+    scorecard,
+)
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
@@ -445,6 +452,37 @@ def with_names_of_tables(rows: Frame) -> Frame:
     return pd.concat([rows, Frame(more, rows.index)], axis=1)
 
 
+def select(rows: Frame, **where: Any) -> Frame:
+    """Rows with these values of columns.
+
+    Raises:
+        MissingRuns: There are none.
+    """
+    for column, value in where.items():
+        if column not in rows or not len(rows := rows[rows[column] == value]):
+            raise MissingRuns(f"{column} {value}")
+    return rows
+
+
+def summary(
+    rows: Frame, by: str | list[str], cells: Mapping[str, tuple[str, str | Callable[..., Any]]]
+) -> Frame:
+    """A table with a row for each value of some columns.
+
+    Args:
+        rows: The rows.
+        by: Columns by whose values rows of the table are made.
+        cells: By heading a column, and what makes one number of it, as pandas knows it. A heading
+            may end with another unit than the column's in square brackets.
+    """
+    table = rows.groupby(by, sort=False).agg(**cells)
+    for heading, (column, _) in cells.items():
+        unit = heading.rpartition("[")[2].rstrip("]")
+        if unit in FACTORS and unit != unit_of(column):
+            table[heading] *= FACTORS[unit]
+    return table.reset_index()
+
+
 def unit_of(column: str) -> str:
     """Unit of a column, from the end of its name; empty without one."""
     words = column.split("_")
@@ -457,7 +495,10 @@ STUDIES = {
     "case-3": "acrobot_cases", "case-4": "caroca_cases",
     "case-5": "caroca_cases", "case-6": "ibvs_cases", "case-a6": "ibvs_cases",
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
-    "case-10": "case_10",
+    "case-10": "case_10", "schemes": "schemes", "fusion": "fusion",
+    "seen-slack": "seen_slack", "failure": "failures", "detection": "failures",
+    "calibration": "calibration", "identification": "identification",
+    "workspaces": "workspaces",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

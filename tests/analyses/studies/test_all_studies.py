@@ -355,7 +355,6 @@ def sets_of(name):
 
 
 NOT_MADE = {
-    "schemes": {"image_far"},
     "case-1": {"returns", "turns_repeat"},
     "mobile-robot": {
         "drift", "lengths", "corrected", "slack", "same_path", "fails_far_off", "spikes_by_slack",
@@ -371,7 +370,7 @@ tables within a row, or whether platforms are lost, or judge printed numbers alo
 own make them fail."""
 
 OTHER_ROWS = (
-    "worked-examples", "stability-shapes", "workspaces", "pick-and-place",
+    "worked-examples", "stability-shapes", "pick-and-place",
 )  # fmt: skip
 """Studies whose rows are solids, polygons, lists and counts; their own tests make each check
 fail."""
