@@ -6,6 +6,7 @@ import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from cdpr_drake.analyses.studies import fusion
 from cdpr_drake.analyses.studies.case_studies import case_1, case_1_ends
 from cdpr_drake.analyses.studies.framework.experiments import (
     POINT_ERROR,
@@ -16,7 +17,6 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     wrong_points,
 )
 from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.fusion import slack_trials
 from cdpr_drake.analyses.studies.tension_cases import case_9, case_9_torque
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -72,7 +72,7 @@ def test_every_case_with_slack_has_the_same(study):
 
 def test_case_1_and_fusion_have_the_same():
     assert set(case_1_ends.POINTS) == set(wrong_points())
-    assert set(wrong_points()) <= set(slack_trials.WRONG)
+    assert set(wrong_points()) <= set(fusion.SLACK_CHANGES)
     following = [case for case in case_1.STUDY.plan(Form()) if case.keys["group"] == case_1.MOVING]
     assert following
     for case in following:
