@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-Frame = pd.DataFrame
+Frame: TypeAlias = pd.DataFrame
 
 Find = Callable[[Frame], tuple[Iterable[bool], str]]
 """Judges a fact that is no comparison: gives of each part whether it holds, and words."""

@@ -13,7 +13,6 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
@@ -344,7 +343,7 @@ def table(trial: str, rows: Frame) -> Frame:
     })  # fmt: skip
 
 
-def _switched(switches: pd.Series) -> float:
+def _switched(switches: Any) -> float:
     """How many runs switched; NaN of a scheme that does not."""
     return float((switches > 0.0).sum()) if switches.notna().any() else np.nan
 

@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -42,9 +42,9 @@ from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
 
-Frame = pd.DataFrame
+Frame: TypeAlias = pd.DataFrame
 Row = Mapping[str, Any]
-Call = partial[Row]
+Call = partial[Any]
 
 ROWS, ARRAYS, RESULTS = "rows.jsonl", "arrays", "results.json"
 """Files of a study's folder: a line each row, arrays of rows by digest, and what came out."""
