@@ -14,14 +14,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-Frame = pd.DataFrame
+Frame: TypeAlias = pd.DataFrame
 
 Find = Callable[[Frame], tuple[Iterable[bool], str]]
 """Judges a fact that is no comparison: gives of each part whether it holds, and words."""
@@ -50,6 +50,7 @@ UNIT_WORDS = {
 
 OVER: Mapping[str, Callable[[Any], Any]] = {
     "mean": np.mean, "median": np.median, "max": np.max, "min": np.min, "sum": np.sum,
+    "rms": lambda values: np.sqrt(np.mean(np.square(values))),
     "drop": lambda values: values[0] - values[-1],
 }  # fmt: skip
 """What makes one number of several rows."""
@@ -99,7 +100,7 @@ class Selection(_Data):
     rows: str = ""
     by: dict[str, list[Any]] = {}
     paired: list[str] = []
-    over: Literal["mean", "median", "max", "min", "sum", "drop", "each"] = "mean"
+    over: Literal["mean", "median", "max", "min", "sum", "rms", "drop", "each"] = "mean"
     across: Literal["", "mean", "max", "min"] = ""
 
     def values(self, table: Frame) -> dict[Any, float]:

@@ -3,16 +3,14 @@
 ACROBOT hangs at poses all over its workspace, with each cable by chance straight or with a length
 paid out beyond its way. The camera in the world that overlooks it draws the scene with the cables
 as they hang, with grain; `vision.cable_detection` finds each of them, how far it sags and how well
-that is known. Knowledge of the pose:
-
-* exact: cables end where they are believed to;
-* off: the believed pose is off by about a millimetre and a tenth of a degree, as estimators are.
+that is known. Cables end where they are believed to if the pose is exact; off by about a millimetre
+and a tenth of a degree, as estimators are, if it is not.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from collections.abc import Iterator
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -21,10 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.framework.runs import Runs
-from cdpr_drake.analyses.studies.framework.statement import OURS, Finding, statement
-from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
-from cdpr_drake.analyses.studies.framework.summary import Cell, Summary
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, summary
 from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -49,12 +44,10 @@ from cdpr_drake.vision.cable_images import sag_of_surplus
 
 ROBOT, MOUNT = "acrobot_small", "overview"
 
-EXACT, OFF = "exact", "off"
-
-ERRORS = {EXACT: (0.0, 0.0), OFF: (0.8e-3, 0.1)}
+ERRORS = {"exact": (0.0, 0.0), "off": (0.8e-3, 0.1)}
 """Standard deviations of each coordinate of the believed pose, drawn and told [m] and [deg]."""
 
-POINTS = 2e-5
+ENDS = 2e-5
 """Standard deviation of each coordinate of exit and anchor points as told [m]; they are exact."""
 
 LOWER, UPPER = (-0.2, -0.2, 0.2), (0.2, 0.2, 0.6)
@@ -71,24 +64,11 @@ STRAIN = 1e-4
 
 GRAIN = 2.0
 
-POSES = (60, 3)
-
-MOST_FALSE, LEAST_HITS = 0.01, 0.95
-"""Shares that are accepted."""
-
-SPREAD = (0.5, 1.5)
-"""Mean square of errors over their standard deviations that is accepted [-]."""
-
 FAR = 3.5
 """Standard deviations beyond which an error is told apart: one of 2000 normal numbers is."""
 
-_STREAM = 409
-
-
-def cases(_form: Form) -> Iterator[Case]:
-    """Both kinds of knowledge."""
-    for pose in (EXACT, OFF):
-        yield Case(name=f"pose {pose}", keys={"pose": pose})
+STREAM = 409
+"""Of random numbers, beside the seed."""
 
 
 @lru_cache(maxsize=1)
@@ -113,14 +93,13 @@ def pictured() -> tuple[CableRobot, CablePicture]:
 
 def drawn_pose(seed: int) -> tuple[RigidTransform, Array]:
     """Pose [m] of a seed and lengths of its cables beyond their ways, shape (m,) [m]."""
-    random = np.random.default_rng([seed, _STREAM])
+    random, cables = np.random.default_rng([seed, STREAM]), pictured()[1].cables
     X_WP = pose_from_angles(
         random.uniform(LOWER, UPPER), np.radians(random.uniform(-TILT, TILT, 3))
     )
-    m = pictured()[1].cables.count
-    longer = np.exp(random.uniform(np.log(SHORTEST), np.log(LONGEST), m))
-    ways = cable_paths(X_WP, pictured()[1].cables).lengths
-    return X_WP, np.where(random.random(m) < 0.5, longer, -STRAIN * ways)
+    longer = np.exp(random.uniform(np.log(SHORTEST), np.log(LONGEST), cables.count))
+    taut = -STRAIN * cable_paths(X_WP, cables).lengths
+    return X_WP, np.where(random.random(cables.count) < 0.5, longer, taut)
 
 
 def true_sags(cables: CableSet, X_WP: RigidTransform, surplus: Array) -> Array:
@@ -133,8 +112,8 @@ def true_sags(cables: CableSet, X_WP: RigidTransform, surplus: Array) -> Array:
     ])  # fmt: skip
 
 
-def seen(seed: int, knowledge: str) -> tuple[np.ndarray, SeenSags, Array]:
-    """The image of a seed's pose, what is found in it, and true sags, shape (m,) [m]."""
+def detected(seed: int, knowledge: str) -> tuple[np.ndarray, SeenSags, Array]:
+    """The image of a seed's pose, what is detected in it, and true sags, shape (m,) [m]."""
     block, picture = pictured()
     X_WP, surplus = drawn_pose(seed)
     context = block.CreateDefaultContext()
@@ -143,33 +122,34 @@ def seen(seed: int, knowledge: str) -> tuple[np.ndarray, SeenSags, Array]:
     lengths = cable_paths(X_WP, picture.cables).lengths + surplus
     image = picture.draw(query, X_WP, lengths, seed)
     metres, degrees = ERRORS[knowledge]
-    wrong = np.random.default_rng([seed, _STREAM + 1]).standard_normal(6)
+    wrong = np.random.default_rng([seed, STREAM + 1]).standard_normal(6)
     deviations = np.repeat([np.radians(degrees), metres], 3)
-    found = find_sags(
+    sags = find_sags(
         image, picture.cables, X_WP @ exponential(wrong * deviations), picture.X_WE,
-        picture.pinhole, SightSettings(ends=POINTS), pose_covariance=np.diag(deviations**2),
+        picture.pinhole, SightSettings(ends=ENDS), pose_covariance=np.diag(deviations**2),
     )  # fmt: skip
-    return image, found, true_sags(picture.cables, X_WP, surplus)
+    return image, sags, true_sags(picture.cables, X_WP, surplus)
 
 
-def measure(case: Case, seed: int) -> dict[str, Any]:
+def image_row(knowledge: str, seed: int) -> dict[str, Any]:
     """An image.
 
     Returns:
         slack, taut: how many cables are; hits: slack ones that are found slack; false_slack: taut
-        ones that are; unseen: cables on which nothing is said, and unseen_slack of them; errors_m
-        and sigmas_m of the sags that are found; squares: mean square of their ratios.
+        ones that are; unseen: cables on which nothing is said, and unseen_slack of them; rms_m,
+        largest_m: errors of the sags that are found; squares, largest_sigmas: mean square and
+        largest of their ratios to standard deviations [-].
     """
-    _, found, true = seen(seed, case.keys["pose"])
-    slack, there = true > 0.0, found.verdict != UNSEEN
-    errors, sigmas = (found.sag - true)[there], found.sigma[there]
+    _, sags, true = detected(seed, knowledge)
+    slack, judged = true > 0.0, sags.verdict != UNSEEN
+    errors, sigmas = (sags.sag - true)[judged], sags.sigma[judged]
     return {
         "slack": int(np.sum(slack)),
         "taut": int(np.sum(~slack)),
-        "hits": int(np.sum(slack & (found.verdict == SLACK))),
-        "false_slack": int(np.sum(~slack & (found.verdict == SLACK))),
-        "unseen": int(np.sum(~there)),
-        "unseen_slack": int(np.sum(slack & ~there)),
+        "hits": int(np.sum(slack & (sags.verdict == SLACK))),
+        "false_slack": int(np.sum(~slack & (sags.verdict == SLACK))),
+        "unseen": int(np.sum(~judged)),
+        "unseen_slack": int(np.sum(slack & ~judged)),
         "rms_m": float(np.sqrt(np.mean(errors**2))),
         "largest_m": float(np.max(np.abs(errors))),
         "squares": float(np.mean((errors / sigmas) ** 2)),
@@ -177,92 +157,72 @@ def measure(case: Case, seed: int) -> dict[str, Any]:
     }
 
 
-@statement("Slack cables that are seen are found slack, 95 of 100.", basis=OURS)
-def hits(runs: Runs) -> Finding:
-    """All cables, by knowledge of the pose."""
-    words, held = [], []
-    for pose, some in runs.by("pose"):
-        of_seen = int(np.sum(some["slack"]) - np.sum(some["unseen_slack"]))
-        found = int(np.sum(some["hits"]))
+def cases(form: Form) -> Iterator[Case]:
+    """Both kinds of knowledge of the pose."""
+    for pose in ERRORS:
+        yield Case(keys={"pose": pose}, call=partial(image_row, pose), seeds=form.times(60, 3))
+
+
+def spread(rows: Frame) -> tuple[list[bool], str]:
+    """Mean squares of errors in deviations, over all cables that are seen."""
+    held, words = [], []
+    for pose, images in rows.groupby("pose", sort=False):
+        count = images["slack"] + images["taut"] - images["unseen"]
+        total, worst = float((count * images["squares"]).sum()), images["largest_sigmas"]
+        mean, far = total / count.sum(), worst > FAR
+        rest = (total - (worst[far] ** 2).sum()) / (count.sum() - far.sum())
+        held.append(bool(0.5 <= mean <= 1.5))
         words.append(
-            f"pose {pose}: {found} of {of_seen} seen, {int(np.sum(some['unseen_slack']))} unseen"
+            f"pose {pose}: {mean:.2f}, largest {worst.max():.1f} deviations; without the worst "
+            f"cable of the {far.sum()} images that have one beyond {FAR:g}: {rest:.2f}"
         )
-        held.append(found >= LEAST_HITS * of_seen)
-    return Finding(found="; ".join(words), held=held)
+    return held, "; ".join(words)
 
 
-@statement("Of taut cables at most one in a hundred is found slack.", basis=OURS)
-def false(runs: Runs) -> Finding:
-    """All cables, by knowledge of the pose."""
-    words, held = [], []
-    for pose, some in runs.by("pose"):
-        found, taut = int(np.sum(some["false_slack"])), int(np.sum(some["taut"]))
-        words.append(f"pose {pose}: {found} of {taut}")
-        held.append(found <= MOST_FALSE * taut)
-    return Finding(found="; ".join(words), held=held)
+def table(rows: Frame) -> Frame:
+    """Cables by knowledge of the pose."""
+    return summary(rows, "pose", {
+        "images": ("seed", "size"), "slack": ("slack", "sum"), "found slack": ("hits", "sum"),
+        "taut": ("taut", "sum"), "of these found slack": ("false_slack", "sum"),
+        "unseen": ("unseen", "sum"), "error of sag, rms, median [mm]": ("rms_m", "median"),
+        "largest [mm]": ("largest_m", "max"), "largest in deviations": ("largest_sigmas", "max"),
+    })  # fmt: skip
 
 
-@statement(
-    "Sags are as well known as the fit says: mean squares of errors in deviations.", basis=OURS
-)
-def spread(runs: Runs) -> Finding:
-    """All cables that are seen, by knowledge of the pose."""
-    words, held = [], []
-    for pose, some in runs.by("pose"):
-        counts = some["slack"] + some["taut"] - some["unseen"]
-        total, worst = float(np.sum(counts * some["squares"])), some["largest_sigmas"]
-        mean, far = total / float(np.sum(counts)), worst > FAR
-        rest = (total - float(np.sum(worst[far] ** 2))) / float(np.sum(counts) - np.sum(far))
-        words.append(
-            f"pose {pose}: {mean:.2f}, largest {float(np.max(some['largest_sigmas'])):.1f} "
-            f"deviations; without the worst cable of the {int(np.sum(far))} images that have one "
-            f"beyond {FAR:g}: {rest:.2f}"
-        )
-        held.append(SPREAD[0] <= mean <= SPREAD[1])
-    return Finding(
-        found="; ".join(words),
-        held=held,
-        why="Errors have a longer tail than normal ones: a few cables make the mean.",
-    )
-
-
-def draw_found(axis: Axes, seed: int) -> None:
-    """An image with what is found in it, cut to where cables are; slack ones with their sags."""
-    image, found, true = seen(seed, EXACT)
+def draw_detected(axis: Axes, seed: int) -> None:
+    """An image with what is detected in it, cut to where cables are; slack ones with their sags."""
+    image, sags, true = detected(seed, "exact")
     axis.imshow(image)
-    everywhere = np.hstack(found.points)
     labels = {TAUT: "on a taut cable", SLACK: "on a slack cable, sag found (true)"}
     for verdict, words in labels.items():
-        look = nth_look(verdict)
-        chosen = [
-            uv for uv, said in zip(found.points, found.verdict, strict=True) if said == verdict
-        ]
-        if chosen:
+        points = [uv for uv, own in zip(sags.points, sags.verdict, strict=True) if own == verdict]
+        if points:
             axis.plot(
-                *np.hstack(chosen), "x" if verdict == SLACK else ".", color=look.color,
+                *np.hstack(points), "x" if verdict == SLACK else ".", color=nth_look(verdict).color,
                 markersize=4.0 if verdict == SLACK else 2.0, linestyle="none", label=words,
             )  # fmt: skip
-    for k in np.flatnonzero(found.verdict == SLACK):
-        uv = found.points[k]
+    for k in np.flatnonzero(sags.verdict == SLACK):
+        uv = sags.points[k]
         third = uv[:, uv.shape[1] // 3].tolist()
         axis.annotate(
-            f"{1e3 * found.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", tuple(third),
+            f"{1e3 * sags.sag[k]:.1f} mm ({1e3 * true[k]:.1f})", tuple(third),
             fontsize=9, xytext=(8, -2), textcoords="offset points",
         )  # fmt: skip
+    everywhere = np.hstack(sags.points)
     low, high = np.min(everywhere, axis=1) - 15.0, np.max(everywhere, axis=1) + 45.0
     axis.set(xlabel="u [px]", ylabel="v [px]", xlim=(low[0], high[0]), ylim=(high[1], low[1]))
     axis.grid(visible=False)
     axis.legend(loc="lower left")
 
 
-def figure(runs: Runs) -> Figure:
-    """An image with what is found in it, and errors of all."""
+def figure(rows: Frame) -> Figure:
+    """An image with what is detected in it, and errors of all."""
     drawn, axes = new_figure(1, 2, (14.0, 5.4), "Cables found in a rendered image, and their sags")
-    draw_found(axes[0], int(runs["seed"][0]))
-    for k, (pose, some) in enumerate(runs.by("pose")):
+    draw_detected(axes[0], int(rows["seed"].iloc[0]))
+    for k, (pose, images) in enumerate(rows.groupby("pose", sort=False)):
         look = nth_look(k)
         axes[1].plot(
-            some["seed"], 1e3 * some["rms_m"], look.marker or "o", color=look.color,
+            images["seed"], 1e3 * images["rms_m"], look.marker or "o", color=look.color,
             markerfacecolor="none", linestyle="none", label=f"pose {pose}",
         )  # fmt: skip
     axes[1].set(xlabel="pose (seed)", ylabel="rms error of sags [mm]", ylim=(0.0, None))
@@ -271,39 +231,15 @@ def figure(runs: Runs) -> Figure:
     return drawn
 
 
-def parameters(_form: Form) -> Mapping[str, Any]:
-    """What all images have in common."""
-    return {
-        "robot": ROBOT, "mount": MOUNT, "errors": ERRORS, "points_m": POINTS,
-        "lower_m": LOWER, "upper_m": UPPER,
-        "tilt_deg": TILT, "surplus_m": (SHORTEST, LONGEST), "grain": GRAIN,
-    }  # fmt: skip
-
-
 STUDY = Study(
     name="seen-slack",
     title="Slack cables found in rendered images: hits, false alarms, and how far they sag",
     cases=cases,
-    measure=measure,
-    seeds=POSES,
-    parameters=parameters,
-    checks=(hits, false, spread),
-    tables=[
-        Summary(
-            "Cables by knowledge of the pose",
-            ("pose",),
-            {
-                "images": Cell("runs"),
-                "slack": Cell("total", "slack"),
-                "found slack": Cell("total", "hits"),
-                "taut": Cell("total", "taut"),
-                "of these found slack": Cell("total", "false_slack"),
-                "unseen": Cell("total", "unseen"),
-                "error of sag, rms, median [mm]": Cell("median", "rms_m", ".3f"),
-                "largest [mm]": Cell("largest", "largest_m", ".2f"),
-                "largest in deviations": Cell("largest", "largest_sigmas", ".1f"),
-            },
-        )
-    ],
+    parameters=lambda form: {
+        "robot": ROBOT, "mount": MOUNT, "errors": ERRORS, "points_m": ENDS, "lower_m": LOWER,
+        "upper_m": UPPER, "tilt_deg": TILT, "surplus_m": (SHORTEST, LONGEST), "grain": GRAIN,
+    },
+    finds={"spread": spread},
+    tables={"Cables by knowledge of the pose": table},
     figures={"seen_slack": figure},
-)
+)  # fmt: skip

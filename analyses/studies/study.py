@@ -18,7 +18,7 @@ from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -29,13 +29,20 @@ from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.studies.facts import Find, MissingRuns, facts_of, judged, scorecard
+from cdpr_drake.analyses.studies.facts import (
+    FACTORS,
+    Find,
+    MissingRuns,
+    facts_of,
+    judged,
+    scorecard,
+)
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest
 
-Frame = pd.DataFrame
+Frame: TypeAlias = pd.DataFrame
 Row = Mapping[str, Any]
 Call = partial[Any]
 
@@ -449,6 +456,37 @@ def with_names_of_tables(rows: Frame) -> Frame:
     return pd.concat([rows, Frame(more, rows.index)], axis=1)
 
 
+def select(rows: Frame, **where: Any) -> Frame:
+    """Rows with these values of columns.
+
+    Raises:
+        MissingRuns: There are none.
+    """
+    for column, value in where.items():
+        if column not in rows or not len(rows := rows[rows[column] == value]):
+            raise MissingRuns(f"{column} {value}")
+    return rows
+
+
+def summary(
+    rows: Frame, by: str | list[str], cells: Mapping[str, tuple[str, str | Callable[..., Any]]]
+) -> Frame:
+    """A table with a row for each value of some columns.
+
+    Args:
+        rows: The rows.
+        by: Columns by whose values rows of the table are made.
+        cells: By heading a column, and what makes one number of it, as pandas knows it. A heading
+            may end with another unit than the column's in square brackets.
+    """
+    table = rows.groupby(by, sort=False).agg(**cells)
+    for heading, (column, _) in cells.items():
+        unit = heading.rpartition("[")[2].rstrip("]")
+        if unit in FACTORS and unit != unit_of(column):
+            table[heading] *= FACTORS[unit]
+    return table.reset_index()
+
+
 def unit_of(column: str) -> str:
     """Unit of a column, from the end of its name; empty without one."""
     words = column.split("_")
@@ -464,6 +502,10 @@ STUDIES = {
     "case-10": "case_10", "mobile-robot": "mobile_robot",
     "control-stability": "control_stability",
     "stability-shapes": "stability_shapes", "stability-closed-loop": "closed_loops",
+    "schemes": "schemes", "fusion": "fusion",
+    "seen-slack": "seen_slack", "failure": "failures", "detection": "failures",
+    "calibration": "calibration", "identification": "identification",
+    "workspaces": "workspaces",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

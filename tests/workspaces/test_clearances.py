@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from pydrake.geometry import Box, Capsule
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from scipy.optimize import lsq_linear
 from scipy.spatial import KDTree
 
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.convex_shapes import ConvexShape
+from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.worlds.motions import JointedBody, PathBody, SteadyBody
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
@@ -420,3 +422,57 @@ def test_the_earliest_way_is_that_of_a_flood(timed, seed):
     assert way.times[-1] == flooded(clear, start, goal)
     for low, high in way.seeds():
         assert np.all(clear[tuple(slice(a, b) for a, b in zip(low, high, strict=True))])
+
+
+def least_squares_clearances(around, position, rotation):
+    """Clearances where nothing overlaps: bounded least squares of the nearest points (BVLS)."""
+    starts = around.cables.p_WA.T
+    ends = position + (rotation @ around.cables.p_PB).T
+    units = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
+
+    def distance(p, q, origin, edges, box):
+        """Of a segment from the points origin + edges s, |s| <= box."""
+        A, bounds = np.column_stack([q - p, -edges]), (np.append(0.0, -box), np.append(1.0, box))
+        nearest = lsq_linear(A, origin - p, bounds, method="bvls", tol=1e-15)
+        return np.linalg.norm(nearest.fun)
+
+    def from_boxes(p, q, rows, R, origin):
+        """Of segments from boxes, as far as they are compared at all."""
+        return min(
+            (
+                distance(a, b, origin + R @ row[9:12], R @ row[:9].reshape(3, 3), row[12:]) - radius
+                for a, b, unit, radius in zip(p, q, units, around.radius, strict=True)
+                if (b - a) @ unit > 0.0
+                for row in rows
+            ),
+            default=np.inf,
+        )
+
+    middles, halves = 0.5 * (starts + ends), 0.5 * (ends - starts)[:, :, np.newaxis]
+    cables = min(
+        distance(starts[i], ends[i], middles[j], halves[j], np.ones(1))
+        - around.radius[i] - around.radius[j]
+        for i, j in around.pairs()
+    )  # fmt: skip
+    to_platform = starts, ends - around.anchor_free * units, around.bodies, rotation, position
+    to_frame = starts + around.exit_free * units, ends, around.fixtures, np.eye(3), np.zeros(3)
+    return np.array([cables, from_boxes(*to_platform), from_boxes(*to_frame)])
+
+
+@pytest.mark.parametrize("name", ["acrobot_large", "caroca"])
+def test_clearances_in_the_frame_are_those_of_least_squares(name):
+    """At pose 1992 a cable of CAROCA is shorter than a beam is thick: it is not compared."""
+    robot = load_robot(name)
+    around = interference_bodies(robot, pulleys=False)
+    compared = 0
+    for number in (*range(12), 1992):
+        random = np.random.default_rng([20, number])
+        position = random.uniform(robot.frame.lower, robot.frame.upper)
+        rotation = rotation_from_angles(random.uniform(-0.3, 0.3, 3)).matrix()
+        ours = clearances(around, position[None], rotation[None])[0, :3]
+        theirs = least_squares_clearances(around, position, rotation)
+        apart = theirs > 0.0
+        np.testing.assert_allclose(ours[apart], theirs[apart], atol=1e-6)
+        assert np.all(ours[~apart] <= 1e-6)
+        compared += np.sum(apart)
+    assert compared > 20

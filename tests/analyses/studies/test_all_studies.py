@@ -354,7 +354,6 @@ def sets_of(name):
 
 
 NOT_MADE = {
-    "schemes": {"image_far"},
     "case-9": {"eta", "polygon", "outward", "residuals", "sensor_accuracy", "stable"},
     "tension-methods": {"closed_form_steady", "unstable"},
 }  # fmt: skip
@@ -363,7 +362,7 @@ tables within a row, or whether platforms are lost, or judge printed numbers alo
 own make them fail."""
 
 OTHER_ROWS = (
-    "worked-examples", "workspaces", "pick-and-place",
+    "worked-examples", "pick-and-place",
 )  # fmt: skip
 """Studies whose rows are solids, polygons, lists and counts; their own tests make each check
 fail."""

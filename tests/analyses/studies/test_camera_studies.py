@@ -1,12 +1,11 @@
-"""Studies of cameras: lenses, turning cameras, textures, slack in pictures."""
+"""Studies of cameras: lenses, turning cameras, textures."""
 
 from functools import partial
 
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
-from cdpr_drake.analyses.studies import lenses, pan_tilt, seen_slack, tagless
+from cdpr_drake.analyses.studies import lenses, pan_tilt, tagless
 from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.studies.made_up_studies import check_told_apart_and_written, made, verdicts
@@ -47,7 +46,7 @@ def test_a_run_comes_to_rest_where_it_should_with_a_known_lens_only():
     assert ignored > 5.0 * ideal
 
 
-# Turning cameras, and slack in pictures.
+# Turning cameras.
 
 
 def turning(case, seed, wrong=False):
@@ -63,19 +62,8 @@ def turning(case, seed, wrong=False):
     }  # fmt: skip
 
 
-def seen(case, seed, wrong=False):
-    return {
-        "slack": 4, "taut": 4, "hits": 1 if wrong else 4, "false_slack": int(wrong), "unseen": 0,
-        "unseen_slack": 0, "rms_m": 1e-3, "largest_m": 2e-3, "squares": 9.0 if wrong else 1.0,
-        "largest_sigmas": 2.0,
-    }  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("study", "made_up"), [(pan_tilt.STUDY, turning), (seen_slack.STUDY, seen)]
-)
-def test_statements_tell_good_eyes_from_bad(study, made_up, tmp_path):
-    check_told_apart_and_written(study, made_up, tmp_path)
+def test_statements_tell_good_eyes_from_bad(tmp_path):
+    check_told_apart_and_written(pan_tilt.STUDY, turning, tmp_path)
 
 
 def test_starts_of_turning_cameras_are_where_they_are_said_to_be():
@@ -83,14 +71,6 @@ def test_starts_of_turning_cameras_are_where_they_are_said_to_be():
         position, angles = map(np.array, pan_tilt.start(seed))
         assert np.all((position >= pan_tilt.LOWER) & (position <= pan_tilt.UPPER))
         assert np.all(np.abs(angles) <= (pan_tilt.TILT, pan_tilt.TILT, pan_tilt.TURN))
-
-
-def test_the_quick_form_draws_images_and_finds_slack_cables():
-    """Few images: what they say is what the full form says, but for the spread of so few."""
-    rows = seen_slack.STUDY(True, StudySession(workers=1)).runs
-    assert sum(rows["slack"]) + sum(rows["taut"]) == 8 * len(rows)
-    assert sum(rows["hits"]) > 0.8 * (sum(rows["slack"]) - sum(rows["unseen_slack"]))
-    assert sum(rows["false_slack"]) == 0
 
 
 # Textured squares.
