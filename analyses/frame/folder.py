@@ -19,7 +19,6 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
-from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.version import __version__
 

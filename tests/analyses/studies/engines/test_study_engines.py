@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cdpr_drake.analyses.studies.engines.study import STUDY, measure
 
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.statements import CONFIRMED, NOT_CONFIRMED
 from cdpr_drake.analyses.studies.engines import pairs
 from cdpr_drake.analyses.studies.engines import study as module
-from cdpr_drake.analyses.studies.engines.study import STUDY, measure
 from cdpr_drake.analyses.studies.framework.study import Form
 from tests.analyses.studies.made_up_studies import made, verdicts
 

@@ -5,10 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
-
-from cdpr_drake.analyses.studies.tension_methods import start_experiments as planned
-from cdpr_drake.analyses.studies.tension_methods import trial
 from cdpr_drake.analyses.studies.tension_methods.coverage import cover, grid_problems
 from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_END, THESIS_START
 from cdpr_drake.analyses.studies.tension_methods.feasible_path import (
@@ -24,6 +20,10 @@ from cdpr_drake.analyses.studies.tension_methods.start_trial import (
     run_start_trial,
 )
 from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
+from scipy.optimize import linprog
+
+from cdpr_drake.analyses.studies.tension_methods import start_experiments as planned
+from cdpr_drake.analyses.studies.tension_methods import trial
 from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.errors import InfeasibleTensionError

@@ -4,12 +4,6 @@ from functools import partial
 
 import matplotlib.pyplot as plt
 import pytest
-
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
-from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
-from cdpr_drake.analyses.studies.framework.statement import FITTED, MET_FITTED
-from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.tension_methods import start_experiments as starts
 from cdpr_drake.analyses.studies.tension_methods.gain_figures import LARGEST
 from cdpr_drake.analyses.studies.tension_methods.start_figures import (
     one_step_figure,
@@ -19,6 +13,12 @@ from cdpr_drake.analyses.studies.tension_methods.start_figures import (
 from cdpr_drake.analyses.studies.tension_methods.start_statements import FACTOR, START_CHECKS
 from cdpr_drake.analyses.studies.tension_methods.statements import CHECKS, GAINS, LP, QP
 from cdpr_drake.analyses.studies.tension_methods.study import STUDY
+
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
+from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs
+from cdpr_drake.analyses.studies.framework.statement import FITTED, MET_FITTED
+from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.studies.tension_methods import start_experiments as starts
 
 JUDGES = {check.name: check for check in CHECKS}
 

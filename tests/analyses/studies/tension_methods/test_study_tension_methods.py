@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
-from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
-from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.analyses.studies.tension_methods.experiments import (
     EXPERIMENTS,
     THESIS_GAINS,
     trials,
 )
 from cdpr_drake.analyses.studies.tension_methods.study import COVERAGE, STUDY, measure
+
+from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
+from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
+from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.cli.app import main
 from tests.analyses.studies.made_up_studies import with_figures
 from tests.messages import printed
