@@ -433,7 +433,7 @@ class StudyResult:
 
 
 def with_names_of_tables(rows: Frame) -> Frame:
-    """With a column "column.name" for each name of the columns that hold tables of names."""
+    """With a column "column.name" for each name of tables of names, at any depth."""
     more: dict[str, Any] = {}
     for column in rows:
         tables = [value for value in rows[column] if isinstance(value, dict)]
@@ -442,7 +442,9 @@ def with_names_of_tables(rows: Frame) -> Frame:
                 value.get(name, np.nan) if isinstance(value, dict) else np.nan
                 for value in rows[column]
             ]
-    return pd.concat([rows, Frame(more, rows.index)], axis=1)
+    if not more:
+        return rows
+    return pd.concat([rows, with_names_of_tables(Frame(more, rows.index))], axis=1)
 
 
 def unit_of(column: str) -> str:
@@ -457,7 +459,8 @@ STUDIES = {
     "case-3": "acrobot_cases", "case-4": "caroca_cases",
     "case-5": "caroca_cases", "case-6": "ibvs_cases", "case-a6": "ibvs_cases",
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
-    "case-10": "case_10",
+    "case-10": "case_10", "case-9-torque": "proposed_cases", "tension-tracking": "proposed_cases",
+    "worked-examples": "worked_examples",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

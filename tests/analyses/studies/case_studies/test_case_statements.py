@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.case_studies import case_1, case_4, case_5, case_a6
+from cdpr_drake.analyses.studies.case_studies import case_1, case_4
 from cdpr_drake.analyses.studies.case_studies.case_1 import MOVING_TIME, moving
 from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     GOAL_KEYS,
@@ -13,11 +13,9 @@ from cdpr_drake.analyses.studies.case_studies.case_1_ends import (
     servo_pays,
     turns_repeat,
 )
-from cdpr_drake.analyses.studies.case_studies.case_4 import slower
 from cdpr_drake.analyses.studies.framework.case_statements import same_accuracy
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns
 from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.tension_cases.case_9_statements import least
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.studies.made_runs import made_run, made_runs
 from tests.figure_faults import figure_faults
@@ -44,22 +42,6 @@ def test_an_accuracy_needs_two_that_converge_and_the_threshold_at_which_runs_end
         for name, error in runs.items()
     ]
     assert same_accuracy(tuple(runs), "").judge(made_runs(made)).verdict == expected
-
-
-@pytest.mark.parametrize(
-    ("outcome", "time", "expected"),
-    [
-        ("converged", 46.0, "confirmed"),
-        ("converged", 35.0, "in part"),
-        ("target_lost", 46.0, "not confirmed"),
-    ],
-)
-def test_a_run_that_loses_its_target_does_not_converge_later(outcome, time, expected):
-    runs = [
-        run("none", time_s=31.0), run("within", time_s=33.0), run("beyond", outcome, time_s=time),
-        run("beyond_raised", time_s=40.0),
-    ]  # fmt: skip
-    assert slower.judge(made_runs(runs)).verdict == expected
 
 
 @pytest.mark.parametrize(
@@ -175,51 +157,11 @@ def test_how_estimates_repeat(spread, fourth, expected):
     assert repeats_by_estimator.judge(made_runs(runs)).verdict == expected
 
 
-def test_the_least_of_configurations_that_have_run_unequally_often():
-    runs = [run("E1", margin=2.0), run("E1", margin=1.0), run("E2", margin=1.5)]
-    assert least(made_runs(runs), ["E1", "E2"], "margin") == 1.0
-
-
-@pytest.mark.parametrize(
-    ("hybrid", "pbvs", "expected"),
-    [(5.0, 9.0, "confirmed"), (8.8, 9.0, "in part"), (9.1, 9.0, "not confirmed")],
-)
-def test_straighter_by_a_hair_is_straighter_in_part(hybrid, pbvs, expected):
-    runs = [run("none", image_max_px=hybrid), run("pbvs", image_max_px=pbvs)]
-    (check,) = [one for one in case_5.STUDY.checks if one.name == "straighter"]
-    said = check.judge(made_runs(runs))
-    assert said.verdict == expected
-    assert (said.cause == "hardware") == (expected != "confirmed")
-
-
-@pytest.mark.parametrize(
-    ("curved", "outcome", "expected"),
-    [
-        (30.0, "converged", "confirmed"),
-        (250.0, "converged", "in part"),  # stable, but the effect is not small
-        (30.0, "target_lost", "not confirmed"),
-    ],
-)
-def test_a_camera_that_is_believed_elsewhere_has_a_small_effect(curved, outcome, expected):
-    line = np.array([[100.0, 100.0], [500.0, 400.0]])
-    runs = [run("camera_E1", image_max_px=10.0, image_line=line)] + [
-        run(f"camera_{name}", outcome, image_max_px=curved, image_line=line)
-        for name in ("E2", "E3", "E4")
-    ]
-    (check,) = [one for one in case_a6.STUDY.checks if one.name == "any_camera"]
-    assert check.judge(made_runs(runs)).verdict == expected
-
-
-def test_cases_1_and_4_are_judged_with_the_printed_heights_and_show_raised_ones():
+def test_case_1_is_judged_with_the_printed_heights_and_shows_raised_ones():
     """Section 2.3.5: from 1.899 m up to a believed 2.202 m."""
-    for study, judged, raised in (
-        (case_1.STUDY, "cp_1", "cr_1"), (case_4.STUDY, "beyond", "beyond_raised"),
-    ):  # fmt: skip
-        cases = {case.name: case for case in study.cases(Form())}
-        heights = [
-            load_scenario("caroca_pbvs", cases[name].changes).initial_pose.position[2]
-            for name in (judged, raised)
-        ]
-        np.testing.assert_allclose(heights, [1.899, 1.899 + case_4.LIFT], atol=1e-9)
-    believed = load_scenario("caroca_pbvs", cases["beyond"].changes).perturbations.initial_pose
-    assert believed.position[2] < 2.3
+    cases = {case.name: case for case in case_1.STUDY.cases(Form())}
+    heights = [
+        load_scenario("caroca_pbvs", cases[name].changes).initial_pose.position[2]
+        for name in ("cp_1", "cr_1")
+    ]
+    np.testing.assert_allclose(heights, [1.899, 1.899 + case_4.LIFT], atol=1e-9)
