@@ -156,9 +156,9 @@ def ways(rows: Frame) -> Frame:
         [*columns, "converged"]
     ].mean()  # fmt: skip
     names = {way: [f"{group}_{way}" for group in DISTURBED] for way in WAYS}
-    if missing := [name for some in names.values() for name in some if name not in means.index]:
+    if missing := sorted({name for group in names.values() for name in group} - {*means.index}):
         raise MissingRuns(", ".join(missing))
-    table = Frame({way: means.loc[some].mean() for way, some in names.items()}).T
+    table = Frame({way: means.loc[group].mean() for way, group in names.items()}).T
     table["usable"] = (table["slack_share"] <= HARDLY) & (table["converged"] == 1.0)
     return table
 

@@ -124,7 +124,7 @@ def motion_of(coefficients: Array) -> tuple[Array, ...]:
     """`MOTION` of polynomials with coefficients c_k of t^k, shape (6, 3)."""
     p = np.polynomial.polynomial
     derivatives = (p.polyder(coefficients, order) for order in range(3))
-    return tuple(np.asarray(p.polyval(TIMES, one), np.float64).T for one in derivatives)
+    return tuple(np.asarray(p.polyval(TIMES, c), np.float64).T for c in derivatives)
 
 
 PROGRAMS = {
