@@ -68,12 +68,9 @@ class StudyEntry:
 
 
 MODULES = {
-    "tension-methods": "tension_methods.study",
-    "worked-examples": "worked_examples.study",
     "stability-ranges": "stability_ranges.study",
     "basin": "basin.study",
     "design": "design",
-    "engines": "engines.study",
     "scenarios": "scenarios",
     "planning": "planning.study",
     "proven-paths": "proven_paths.study",
@@ -82,18 +79,6 @@ MODULES = {
     "lenses": "lenses",
     "adaptation": "adaptation",
     "pan-tilt": "pan_tilt",
-    "case-2": "case_studies.case_2",
-    "case-3": "case_studies.case_3",
-    "case-4": "case_studies.case_4",
-    "case-5": "case_studies.case_5",
-    "case-6": "case_studies.case_6",
-    "case-7": "case_studies.case_7",
-    "case-8": "case_studies.case_8",
-    "case-a6": "case_studies.case_a6",
-    "case-9": "tension_cases.case_9",
-    "case-9-torque": "tension_cases.case_9_torque",
-    "case-10": "tension_cases.case_10",
-    "tension-tracking": "tension_cases.tension_tracking",
 }
 """Modules of this room by study, in the order in which the command line lists them.
 

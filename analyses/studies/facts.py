@@ -219,7 +219,7 @@ class Part(Selection):
             held = [value > 0.0 for value in some.values(rows).values()]
             return self._taken(held), f"{sum(held)} of {len(held)}"
         if self.is_ is not None:
-            is_so = f"{self.of} == {self.is_!r}"
+            is_so = f"`{self.of}` == {self.is_!r}"
             some = Selection(where=self.where, rows=self.rows, by=self.by, of=is_so)
             shares = some.values(rows)
             words = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares.items())
@@ -309,7 +309,8 @@ class Part(Selection):
         if self.per is not None:
             return ""
         column = self.of if isinstance(self.of, str) else self.of[0]
-        return self.unit or UNIT_WORDS.get(column.rpartition("_")[2] if "_" in column else "", "")
+        ends = (name.rpartition("_")[2] for name in reversed(column.split(".")) if "_" in name)
+        return self.unit or next((UNIT_WORDS[end] for end in ends if end in UNIT_WORDS), "")
 
 
 class Entry(_Data):

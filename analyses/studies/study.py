@@ -444,7 +444,7 @@ class StudyResult:
 
 
 def with_names_of_tables(rows: Frame) -> Frame:
-    """With a column "column.name" for each name of the columns that hold tables of names."""
+    """With a column "column.name" for each name of tables of names, at any depth."""
     more: dict[str, Any] = {}
     for column in rows:
         tables = [value for value in rows[column] if isinstance(value, dict)]
@@ -453,7 +453,9 @@ def with_names_of_tables(rows: Frame) -> Frame:
                 value.get(name, np.nan) if isinstance(value, dict) else np.nan
                 for value in rows[column]
             ]
-    return pd.concat([rows, Frame(more, rows.index)], axis=1)
+    if not more:
+        return rows
+    return pd.concat([rows, with_names_of_tables(Frame(more, rows.index))], axis=1)
 
 
 def select(rows: Frame, **where: Any) -> Frame:
@@ -506,6 +508,8 @@ STUDIES = {
     "seen-slack": "seen_slack", "failure": "failures", "detection": "failures",
     "calibration": "calibration", "identification": "identification",
     "workspaces": "workspaces",
+    "case-9-torque": "proposed_cases", "tension-tracking": "proposed_cases",
+    "worked-examples": "worked_examples",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
 

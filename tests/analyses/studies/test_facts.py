@@ -25,6 +25,7 @@ ROWS = pd.DataFrame({
     "other_m": [0.01, 0.01, 0.02, 0.02, 0.02, 0.02],
     "angle_rad": np.radians([1.0, 3.0, 5.0, 5.0, 9.0, 9.0]),
     "outcome": ["converged", "converged", "converged", "lost", "lost", "lost"],
+    "polygon.inside": [True, False, True, True, False, False],
 })  # fmt: skip
 
 BY = {"robot": ["a", "b", "c"]}
@@ -54,6 +55,7 @@ HOLDS = {
     "paired": ({"of": "error_m", "where": {"robot": "b"}, "paired": ["seed"], "above": "than",
                 "than": {"where": {"robot": "a"}}, "plus": 10.5}, [1, 0]),
     "is": ({"of": "outcome", "by": BY, "is": "converged"}, [1, 0, 0]),
+    "is, in a table": ({"of": "polygon.inside", "by": BY, "is": True}, [0, 1, 0]),
     "rising": ({"of": "error_m", "by": BY, "rising": 1.9}, [1, 1]),
     "rising, not enough": ({"of": "error_m", "by": BY, "rising": [2.1, 1.0]}, [0, 1]),
     "falling": ({"of": "error_m", "by": {"robot": ["c", "b", "a"]}, "falling": 1}, [1, 1]),
@@ -94,6 +96,7 @@ def test_words_have_the_numbers_and_the_unit_of_the_print():
     one = part({"of": "error_m", "by": BY, "at_most": 40})
     assert one.judge(ROWS)[1] == "a 20, b 40, c 80 mm"
     assert one.print_words() == "at most 40 mm"
+    assert Part(of="tension_n.C1", below=3).print_words() == "below 3 N"
     near = part({"of": "angle_rad", "unit": "deg", "about": 5, "share": 0.2})
     assert near.print_words() == "about 5 deg (within 20 %)"
 
@@ -229,7 +232,7 @@ def test_entries_are_printed_in_their_section():
 
 def test_every_source_is_accepted_and_its_studies_are_known():
     facts = [fact for source in sources() for fact in source.facts()]
-    assert len(sources()) == 3
+    assert len({source.title for source in sources()}) == 3
     assert facts
     for name in STUDIES:
         study = study_named(name)

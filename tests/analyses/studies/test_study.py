@@ -237,5 +237,12 @@ def test_units_are_the_ends_of_names(column, unit):
     assert unit_of(column) == unit
 
 
+def test_tables_of_names_are_columns_at_any_depth():
+    rows = pd.DataFrame({"a": [1, 2], "of": [{"b": 3, "c": {"d": 4}}, {"b": 5, "c": None}]})
+    spread = module.with_names_of_tables(rows)
+    assert spread["of.b"].tolist() == [3, 5]
+    assert spread["of.c.d"].fillna(0).tolist() == [4, 0]
+
+
 def test_a_form_says_how_often():
     assert [Form().times(5), Form(quick=True).times(5), Form(seeds=9).times(5, most=3)] == [5, 1, 3]
