@@ -15,7 +15,6 @@ from cdpr_drake.analyses.studies.framework.experiments import (
     turned,
     wrong_points,
 )
-from cdpr_drake.analyses.studies.framework.study import Form
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.systems.diagrams.load import load_scenario
 
