@@ -53,11 +53,14 @@ def test_each_does_what_its_name_says():
     assert make_shaper("ZVD", W, 0.1).left(W, 0.1) < 1e-12
 
 
-def test_two_in_turn_take_both_away():
-    both = make_shaper("ZV", W).then(make_shaper("ZV", 2.3 * W))
-    assert both.left(W) < 1e-12
-    assert both.left(2.3 * W) < 1e-12
-    assert both.duration == pytest.approx(np.pi / W * (1.0 + 1.0 / 2.3))
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_two_in_turn_take_both_away(damping):
+    both = make_shaper("ZV", W, damping).then(make_shaper("ZVD", 2.3 * W, damping))
+    assert both.left(W, damping) < 1e-12
+    assert both.left(2.3 * W, damping) < 1e-12
+    assert both.amplitudes.sum() == pytest.approx(1.0)
+    half = np.pi / (W * np.sqrt(1.0 - damping**2))
+    assert both.duration == pytest.approx(half * (1.0 + 2.0 / 2.3))
 
 
 def test_a_shaped_law_of_time_goes_from_0_to_1():

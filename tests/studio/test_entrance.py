@@ -18,6 +18,7 @@ from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+from tests.messages import printed
 from tests.studio.served import served
 
 TOKEN = "secret-token-of-a-test"
@@ -114,9 +115,9 @@ def test_what_is_refused_at_the_start(tmp_path, monkeypatch, capsys, options, va
     with pytest.raises(SystemExit) as ended:
         main(["studio", "--folder", str(tmp_path), "--port", "0", "--no-browser", *options])
     assert ended.value.code == 2
-    printed = capsys.readouterr()
-    assert printed.err.startswith(f"cdpr: {words}")
-    assert TOKEN not in printed.out + printed.err
+    said = printed(capsys)
+    assert said.err.startswith(f"cdpr: {words}")
+    assert TOKEN not in said.out + said.err
 
 
 def test_a_token_that_is_set_is_not_printed(tmp_path, monkeypatch):

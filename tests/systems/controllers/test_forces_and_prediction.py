@@ -17,11 +17,13 @@ from cdpr_drake.control.force_laws import port_energy
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance, rotation_from_vector
+from cdpr_drake.models.plant_rest import rows_of_motors
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.horizon import EFFORT, TIME_CONSTANT, Horizon, View
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
+from cdpr_drake.systems.controllers.plant_following import MotorFollower
 from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import (
@@ -32,6 +34,7 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.disturbances import DisturbanceSettings, Push
 from cdpr_drake.systems.scenarios.run_settings import engine_of, set_engine
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
+from tests.mechanisms.mechanism_cases import cables_of
 from tests.systems.controllers.controller_cases import tension_run
 
 HELD, LED, WIND = "acrobot_table_edge", "acrobot_led_by_hand", "acrobot_against_wind"
@@ -269,3 +272,26 @@ def test_a_scenario_runs_with_prediction():
     assert log["failures"][-1, 0] == 0.0
     assert np.min(log["tensions"][1:]) >= 2.0
     assert np.max(log["tensions"]) <= 60.0
+
+
+def test_motors_of_joints_hold_against_what_the_cables_pull():
+    """Their force beside the desired one is the slope of the cables' lengths times the tensions."""
+    cables = cables_of("mobile_masts")
+    plant, random = cables.plant, np.random.default_rng(4)
+    context, nv = plant.CreateDefaultContext(), plant.num_velocities()
+    q, force = plant.GetPositions(context), random.normal(size=nv)
+    tensions = np.linspace(5.0, 20.0, cables.routes.count)
+    block = MotorFollower(cables, tensions)
+    inputs = block.CreateDefaultContext()
+    block.GetInputPort("desired_state").FixValue(inputs, np.concatenate([q, np.zeros(nv)]))
+    block.GetInputPort("desired_force").FixValue(inputs, force)
+
+    def pull(step):
+        plant.SetPositions(context, q + plant.MapVelocityToQDot(context, step))
+        return tensions @ cables.lengths_and_jacobian(context)[0]
+
+    slopes = [(pull(step) - pull(-step)) / 2e-6 for step in 1e-6 * np.eye(nv)]
+    expected = np.where(rows_of_motors(plant), force + slopes, 0.0)
+    found = block.GetOutputPort("motor_force").Eval(inputs)
+    assert found == pytest.approx(expected, abs=1e-6)  # of differences of 1e-6 of sums of 100 N m
+    assert np.count_nonzero(found) == 8
