@@ -111,7 +111,7 @@ class Folder:
                 words = "; ".join(different[:3]) or "these are complete"
                 raise OutputFolderError(
                     f"{self.path}: holds other results: {words}; name another folder or allow "
-                    "overwriting"
+                    "overwrite"
                 )
             self._files = marker["files"]
         for path in list(self.path.iterdir()):

@@ -21,7 +21,7 @@ from cdpr_drake.analyses.design.settings import (
     load_design_settings,
 )
 from cdpr_drake.analyses.front.session import Session, asked_workers, kept_folder
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import DesignError

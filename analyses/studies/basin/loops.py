@@ -17,8 +17,8 @@ from cdpr_drake.analyses.studies.basin.starts import (
     start_poses,
 )
 from cdpr_drake.analyses.studies.framework.runs import Row
-from cdpr_drake.analyses.studies.framework.servo_models import Perturbation, perturbed_scenario
 from cdpr_drake.analyses.studies.framework.study import Case
+from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_scenario
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, DivergedError, InfeasibleTensionError
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row, pose_rows_distance

@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.framework.servo_cases import servo_case
-from cdpr_drake.analyses.studies.framework.servo_models import (
+from cdpr_drake.analyses.studies.perturbed_servo import (
     PerturbedServo,
+    servo_case,
 )
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.study import Case
-from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS, recipe_case, recipe_grid
 from cdpr_drake.analyses.studies.stability_ranges.question import (
     PLANAR_ROBOT,
     SPATIAL_ROBOT,
@@ -23,6 +22,7 @@ from cdpr_drake.analyses.studies.stability_ranges.robot_limits import (
     RobotLimits,
     camera_at,
 )
+from cdpr_drake.analyses.studies.stability_recipe import DRAWS, recipe_case, recipe_grid
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 

@@ -15,13 +15,13 @@ from functools import partial
 import numpy as np
 
 from cdpr_drake.analyses.studies.framework.study import Case
-from cdpr_drake.analyses.studies.published.stability_recipe import (
+from cdpr_drake.analyses.studies.stability_ranges.question import SINGLE, Answer, question
+from cdpr_drake.analyses.studies.stability_recipe import (
     DRAWS,
     recipe_case,
     recipe_grid,
     single_bounds,
 )
-from cdpr_drake.analyses.studies.stability_ranges.question import SINGLE, Answer, question
 from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.stability.desired_view import OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds

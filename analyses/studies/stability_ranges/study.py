@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 from cdpr_drake.analyses.studies.framework.study import Case, Form, Study
-from cdpr_drake.analyses.studies.published.stability_recipe import DRAWS
 from cdpr_drake.analyses.studies.stability_ranges import (
     planar_statements,
     robot_limits,
@@ -20,6 +19,7 @@ from cdpr_drake.analyses.studies.stability_ranges.figures import FIGURES
 from cdpr_drake.analyses.studies.stability_ranges.question import measure
 from cdpr_drake.analyses.studies.stability_ranges.tables import range_tables
 from cdpr_drake.analyses.studies.stability_ranges.vision import vision_cases
+from cdpr_drake.analyses.studies.stability_recipe import DRAWS
 
 
 def cases(form: Form) -> Iterator[Case]:

@@ -19,7 +19,7 @@ from cdpr_drake.analyses.design.search import evaluate_original, goal_context, s
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.front.design import optimize_design
 from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE
+from cdpr_drake.analyses.reporting.tables import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE
 from cdpr_drake.analyses.studies import design as study
 from cdpr_drake.analyses.studies.catalogue import STUDIES
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs, pack_row

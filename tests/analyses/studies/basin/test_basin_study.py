@@ -14,7 +14,7 @@ from cdpr_drake.analyses.studies.basin import statements as said
 from cdpr_drake.analyses.studies.basin.figures import basin_figure, turn_figure
 from cdpr_drake.analyses.studies.basin.study import BLOCKS, POINTS, STUDY, cases, numbers
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.framework.servo_models import Perturbation, perturbed_scenario
+from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_scenario
 from cdpr_drake.analyses.studies.framework.study import Case, Form
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_row
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations

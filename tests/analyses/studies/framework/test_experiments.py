@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cdpr_drake.analyses.studies import case_1, fusion
-from cdpr_drake.analyses.studies.framework.experiments import (
+from cdpr_drake.analyses.studies.experiments import (
     POINT_ERROR,
     as_transform,
     between,

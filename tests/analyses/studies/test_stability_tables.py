@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.published.stability_tables import (
+from cdpr_drake.analyses.studies.stability_tables import (
     BASELINE_VALUES,
     BY_NAME,
     TABLES,

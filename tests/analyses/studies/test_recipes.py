@@ -4,22 +4,21 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.benchmarks.stability import plain_pairs
-from cdpr_drake.analyses.studies.published.recipe_choices import chosen_on
-from cdpr_drake.analyses.studies.published.recipe_variants import (
+from cdpr_drake.analyses.studies.recipe_variants import (
     EXCHANGE,
     IN_USE,
     PRESENT,
     RECIPES,
     exchanged_anchors,
 )
-from cdpr_drake.analyses.studies.published.stability_recipe import (
+from cdpr_drake.analyses.studies.stability_recipe import (
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
     single_bounds,
 )
-from cdpr_drake.analyses.studies.published.stability_tables import BY_NAME
+from cdpr_drake.analyses.studies.stability_tables import BY_NAME
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.stability.desired_view import OppositeCorner
 from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
@@ -144,13 +143,3 @@ def test_plain_loop_agrees_with_the_kernel():
     found = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
     assert [plain_pairs(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
     assert 0 < np.sum(found) < len(poses)
-
-
-def test_which_rows_the_recipe_was_chosen_on():
-    assert chosen_on("A.10", "r_A", 0.1)
-    assert chosen_on("A.15", "r_bp", 1.0)
-    assert chosen_on("A.11", "r_bp", 0.03)
-    assert chosen_on("A.11", "r_A", 0.1)
-    assert chosen_on("A.11", "r_bp", 0.1)
-    assert not chosen_on("A.16", "r_bp", 0.1)
-    assert not chosen_on("A.13", "d_theta_pc_deg", 40.0)

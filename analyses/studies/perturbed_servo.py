@@ -1,4 +1,4 @@
-"""A visual servo that believes its robot to be off by one given perturbation."""
+"""A visual servo whose model is off by one given perturbation, and its case for verdicts."""
 
 from __future__ import annotations
 
@@ -8,13 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import angles_from_rotation, rotation_from_vector
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.servoing.visual_features import VisualFeatures
 from cdpr_drake.stability.criterion import ModelAtPose, stability_margin, stability_matrix
-from cdpr_drake.stability.perturbation_bounds import POSE_BLOCKS
+from cdpr_drake.stability.desired_view import FixedObject
+from cdpr_drake.stability.perturbation_bounds import (
+    POSE_BLOCKS,
+    PerturbationBounds,
+    vector_size,
+)
+from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.systems.controllers.schemes import ideal_sighting, make_features
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.vision.target import Target
@@ -173,4 +180,46 @@ def perturbed_servo(scenario: Scenario, perturbation: Perturbation) -> Perturbed
         X_PC=robot.camera_mount(scenario.camera.mount).pose.transform(),
         X_WO=scenario.target.pose.transform(),
         perturbation=perturbation,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ServoCase:
+    """A servo and the same for verdicts.
+
+    Attributes:
+        servo: Without errors of its model.
+        case: The same for the verdicts; it knows no pulleys.
+        bounds: What limits the errors, of the robot's workspace by default.
+        box: Lower and upper corner of where Po may start, shape (3,) each [m].
+    """
+
+    servo: PerturbedServo
+    case: StabilityCase
+    bounds: PerturbationBounds
+    box: tuple[Array, Array]
+
+
+def servo_case(scenario: Scenario, lowest: float) -> ServoCase:
+    """The servo of a scenario with a robot that ships.
+
+    Args:
+        scenario: The task of the servo.
+        lowest: Least height of Po at the start [m].
+    """
+    robot = load_robot(scenario.robot)
+    defaults = workspace_defaults(robot, scenario.robot)
+    none = Perturbation.from_vector(np.zeros(vector_size(len(robot.cables))))
+    servo = perturbed_servo(scenario, none)
+    return ServoCase(
+        servo=servo,
+        case=StabilityCase(
+            robot.cable_set().without_pulleys(),
+            scenario.controller.scheme,
+            X_PC=servo.X_PC,
+            target=FixedObject(servo.X_WO, scenario.desired.transform()),
+            lever="object",
+        ),
+        bounds=defaults.bounds,
+        box=(np.maximum(defaults.lower, [-np.inf, -np.inf, lowest]), defaults.upper),
     )
