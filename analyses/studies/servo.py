@@ -126,8 +126,10 @@ def servo_cases(
         for c in some:
             call = partial(
                 servo_run, c.scenario or scenario, (*changes, *c.changes, f"camera.kind={camera}"),
-                metrics, stability, **({"platform": c.platform} if c.platform else {}),
+                metrics, stability,
             )  # fmt: skip
+            if c.platform:
+                call = partial(call, platform=c.platform)
             most = 1 if camera == RENDERED else None
             keys = {"configuration": c.name, "group": c.group, "camera": camera}
             yield Case(
@@ -196,6 +198,10 @@ def stability_curves(result: RunResult, threshold: float) -> dict[str, Array]:
 def projected(rows: Frame) -> Frame:
     """Rows with projected images, of which facts, figures and tables are."""
     return rows[rows["camera"] == PROJECTED]
+
+
+def _of_projected(make: Callable[[Frame], Any], rows: Frame) -> Any:
+    return make(projected(rows))
 
 
 def outcome_words(outcomes: Iterable[str]) -> str:
@@ -298,11 +304,10 @@ def servo_study(
             for camera, words in cameras.items()
         }
         | {
-            title: (lambda rows, make=make: make(projected(rows)))
-            for title, make in (tables or {}).items()
+            title: partial(_of_projected, make) for title, make in (tables or {}).items()
         },
         figures={
-            name: (lambda rows, make=make: make(projected(rows), labels))
+            name: partial(_of_projected, partial(make, labels=labels))
             for name, make in drawn.items()
         },
     )
