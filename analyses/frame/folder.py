@@ -19,7 +19,9 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
 
 MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
@@ -27,10 +29,6 @@ MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
 
 LONGEST_VALUE = 60
 """Longer JSON values are not quoted in refusals [characters]."""
-
-
-class NothingToDraw(Exception):
-    """There are no data yet for a figure; it is left out, and that is no failure."""
 
 
 class Folder:
@@ -56,7 +54,7 @@ class Folder:
             OutputFolderError: The path is a file, a mount point, or the working folder or above it.
         """
         self.path, self.resumed = Path(path).absolute(), False
-        self._arguments: Any = json.loads(json.dumps(arguments))
+        self._arguments: Any = load_json(json.dumps(arguments))
         self._overwrite, self._grows = overwrite, grows
         self._files: list[str] = []
         self._made = self._open_now = False
@@ -226,7 +224,7 @@ class Folder:
 def read_marker(folder: Path) -> dict[str, Any] | None:
     """The marker of a results folder; None without one, or if it cannot be read."""
     try:
-        marker = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+        marker = load_json((folder / MARKER).read_text(encoding="utf-8"))
         names = {"complete": bool(marker["complete"]), "files": list(marker["files"])}
         return {"arguments": marker["arguments"], **names}
     except (OSError, ValueError, KeyError, TypeError):
@@ -251,7 +249,7 @@ def foreign_files(folder: Path) -> list[str]:
 
 def free_folder(base: Path, arguments: Mapping[str, Any]) -> Path:
     """The first of base, base-2, ... that is free, or where these arguments go on."""
-    wanted = json.loads(json.dumps(arguments))
+    wanted = load_json(json.dumps(arguments))
     for number in count(1):
         path = base if number == 1 else base.with_name(f"{base.name}-{number}")
         marker = read_marker(path)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.folder import NothingToDraw
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.recipe_variants import (
     FULLY_CONSTRAINED,

@@ -26,6 +26,7 @@ from cdpr_drake.analyses.studies.facts import GOOD, Entry, Fact, sources
 from cdpr_drake.analyses.studies.study import RESULTS, STUDIES, run_study
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Summarized
 
@@ -271,7 +272,7 @@ def _older(path: Path) -> dict[str, str]:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found: dict[str, Any] = load_json(path.read_text(encoding="utf-8"))
         return found
     except (OSError, ValueError):
         return None

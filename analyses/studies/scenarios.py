@@ -13,10 +13,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from cdpr_drake.analyses.reporting.statements import new_table
 from matplotlib.figure import Figure
 from rich.table import Table
 
-from cdpr_drake.analyses.reporting.statements import new_table
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.studies.framework.runs import MissingRuns, Run, Runs

@@ -303,9 +303,7 @@ def servo_study(
             for group in groups
             for camera, words in cameras.items()
         }
-        | {
-            title: partial(_of_projected, make) for title, make in (tables or {}).items()
-        },
+        | {title: partial(_of_projected, make) for title, make in (tables or {}).items()},
         figures={
             name: partial(_of_projected, partial(make, labels=labels))
             for name, make in drawn.items()

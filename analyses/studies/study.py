@@ -42,6 +42,7 @@ from cdpr_drake.analyses.studies.facts import (
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.summaries import Summarized
 
@@ -357,7 +358,7 @@ def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
     """Rows of a folder by digest; a line that a kill has cut does not count."""
     path = folder / ROWS
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    return dict(json.loads(line) for line in lines if line.endswith("\n"))
+    return dict(load_json(line) for line in lines if line.endswith("\n"))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -4,18 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.basin import loops, starts
 from cdpr_drake.analyses.studies.basin import statements as said
 from cdpr_drake.analyses.studies.basin.figures import basin_figure, turn_figure
 from cdpr_drake.analyses.studies.basin.study import BLOCKS, POINTS, STUDY, cases, numbers
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
-from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_scenario
 from cdpr_drake.analyses.studies.framework.study import Case, Form
+from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_scenario
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_row
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.verdict import VERDICTS

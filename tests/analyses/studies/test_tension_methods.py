@@ -1,29 +1,29 @@
-"""Runs of the control by tensions: numbers, starts beside the path, falls, paths, coverage."""
+"""Control by tensions: numbers of its trials, starts beside the path, paths, coverage."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
-from cdpr_drake.analyses.studies.tension_methods.coverage import cover, grid_problems
-from cdpr_drake.analyses.studies.tension_methods.experiments import THESIS_END, THESIS_START
-from cdpr_drake.analyses.studies.tension_methods.feasible_path import (
-    FINE,
-    STEPS,
-    can_hold,
-    held_path,
-)
-from cdpr_drake.analyses.studies.tension_methods.start_trial import (
-    NOTHING,
-    STATIC,
-    StartTrial,
-    run_start_trial,
-)
-from cdpr_drake.analyses.studies.tension_methods.trial import Applied, TensionTrial, run_trial
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.studies.tension_methods import start_experiments as planned
-from cdpr_drake.analyses.studies.tension_methods import trial
+from cdpr_drake.analyses.statics.tension_query import applicable_methods
+from cdpr_drake.analyses.studies import tension_trials as trials
+from cdpr_drake.analyses.studies.tension_methods import GAINS, near_instability
+from cdpr_drake.analyses.studies.tension_trials import (
+    FINE,
+    NOTHING,
+    STATIC,
+    THESIS_END,
+    THESIS_START,
+    Applied,
+    StartTrial,
+    TensionTrial,
+    can_hold,
+    held_path,
+    run_start_trial,
+    run_trial,
+)
 from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.errors import InfeasibleTensionError
@@ -40,6 +40,7 @@ from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 ROBOT = load_robot("caroca_gazebo")
 HOME = np.array(ROBOT.home.position)
+PROBLEM = tension_problem(ROBOT, ROBOT.home.transform())
 GRAVITY = 9.81
 
 TRACKING = 1e-6
@@ -59,11 +60,11 @@ def matrix_at(position):
 
 def run(method="quadratic_program", **changes):
     home = ROBOT.home.transform()
-    asked = {
+    settings = {
         "experiment": "test", "robot": "caroca_gazebo", "path": (home, home), "legs": (1.0,),
         "method": method, "stiffness": 100.0, "damping": 100.0, "duration": 0.2,
     }  # fmt: skip
-    return run_trial(TensionTrial(**(asked | changes)))
+    return run_trial(TensionTrial(**(settings | changes)))
 
 
 def test_a_platform_at_rest_stays():
@@ -71,12 +72,10 @@ def test_a_platform_at_rest_stays():
     assert not found["lost"]
     assert found["position_error_max_m"] < TRACKING
     assert found["failures"] == found["negative_tensions"] == 0
-    assert found["control_steps"] == pytest.approx(0.2 / trial.STEP, abs=1)
+    assert found["control_steps"] == pytest.approx(0.2 / trials.STEP, abs=1)
     assert found["tension_min_n"] >= 1.0
     assert found["end_time_s"] == pytest.approx(0.2)
     assert found["times_s"].shape == found["errors_m"].shape == (len(found["tensions_n"]),)
-    words = trial.label_of({"method": "a", "kp_per_s2": 1.0, "applied": "cut"})
-    assert words == "a, Kp 1, cut"
     assert run(rate=100.0)["control_steps"] == pytest.approx(20, abs=1)
 
 
@@ -95,7 +94,7 @@ def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
     assert held["lost"]
     assert held["failures"] >= held["control_steps"] - 1
     assert held["end_time_s"] < 1.0
-    assert held["position_error_max_m"] == pytest.approx(trial.LOST_DISTANCE, rel=0.05)
+    assert held["position_error_max_m"] == pytest.approx(trials.LOST_DISTANCE, rel=0.05)
     pushed = run("closed_form", applied=Applied.PUSHED)
     assert not pushed["lost"]
     assert pushed["tension_min_n"] < 0.0
@@ -107,7 +106,7 @@ def test_what_is_interrupted_is_no_run(monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(trial._Recorder, "__call__", interrupt)
+    monkeypatch.setattr(trials._Recorder, "__call__", interrupt)
     with pytest.raises(KeyboardInterrupt):
         run()
 
@@ -120,7 +119,7 @@ def test_unchecked_tensions_out_of_bounds_come_out_balanced(method):
     start = pose_from_angles(np.array(THESIS_START) - [0.0, 0.0, 0.2], np.zeros(3))
     settings = TensionControlSettings(
         trajectory=PoseTrajectory((start, start), (1.0,)), gains=TaskGains(100.0, 100.0),
-        method=method, push=True, distributor=trial.UncheckedDistributor,
+        method=method, push=True, distributor=trials.UncheckedDistributor,
     )  # fmt: skip
     control = build_tension_control(ROBOT, settings)
     context = control.make_context()
@@ -140,7 +139,7 @@ def test_unchecked_tensions_out_of_bounds_come_out_balanced(method):
 
 def beside(**changes):
     asked = {
-        "experiment": planned.START_ERROR, "robot": "caroca_gazebo", "path": (HOME, HOME),
+        "experiment": trials.START_ERROR, "robot": "caroca_gazebo", "path": (HOME, HOME),
         "leg": 1.0, "method": "quadratic_program", "gain": 100.0, "applied": Applied.HELD,
         "balance": WRENCH, "rate": 1000.0, "start": "somewhere",
         "position": HOME - [0.0, 0.0, 0.1], "duration": 0.2,
@@ -211,38 +210,6 @@ def test_a_platform_that_nothing_holds_is_lost():
     assert found["end_time_s"] < 5.0
 
 
-def test_the_plan_of_starts_is_what_was_written_before():
-    specs = planned.start_trials(quick=False)
-    some = [one for one in specs if one.experiment == planned.START_ERROR]
-    made = {(one.method, one.gain, one.start, one.rate, one.balance, one.duration) for one in some}
-    assert made == {
-        (method, gain, start, rate, balance, 100.0)
-        for method in planned.PRINTED
-        for gain in planned.GAINS
-        for start in ("0.3 m", "0.4 m", "0.5 m", "0.6 m", planned.LAUNCH)
-        for rate in planned.RATES
-        for balance in (WRENCH, FORCE)
-    }
-    pulses = [one for one in specs if one.between]
-    assert {(one.start, one.between) for one in pulses} == {
-        (start, between)
-        for start in (planned.ON_PATH, planned.LAUNCH)
-        for between in (NOTHING, STATIC)
-    }
-    assert {(one.balance, one.rate) for one in pulses} == {(FORCE, 100.0)}
-    assert len({one.name() for one in specs}) == len(specs)
-    for one in some:
-        if one.start != planned.LAUNCH:
-            assert one.start_error() == pytest.approx(float(one.start.split()[0]))
-        way = np.cross(one.position - one.path[0], HOME - one.path[0])
-        np.testing.assert_allclose(way, np.zeros(3), atol=1e-12)
-    assert planned.ERRORS == (0.3, 0.4, 0.5, 0.6)
-    np.testing.assert_allclose(planned.path_of("closed_form")[0], [0.0, -2.0, 1.8])
-    short = planned.start_trials(quick=True)
-    assert len(short) == 12
-    assert {one.duration for one in short} == {planned.QUICK_TIME}
-
-
 def holds_by_linprog(position):
     """An independent verdict."""
     X_WP, cables = pose_from_angles(position, np.zeros(3)), ROBOT.cable_set(pulleys=False)
@@ -262,7 +229,7 @@ def test_the_printed_start_is_moved_by_the_least_amount():
     assert 0.0 < path.start_limit <= path.start_shift
     assert holds_by_linprog(start + (path.start_limit + FINE) * way)
     assert not holds_by_linprog(start + (path.start_limit - 2.0 * FINE) * way)
-    for share in np.linspace(0.0, 1.0, STEPS // 20):
+    for share in np.linspace(0.0, 1.0, 50):
         assert holds_by_linprog(path.start + share * (path.end - path.start))
 
 
@@ -276,26 +243,32 @@ def test_a_path_that_can_be_held_stays_and_the_inside_must_be_held():
         held_path(ROBOT, HOME, HOME, np.array(THESIS_START))
 
 
-@pytest.mark.parametrize("name", ["caroca_gazebo", "planar"])
-def test_exact_methods_solve_all_of_a_grid_and_no_verdict_is_wrong(name):
-    rows = cover(name, (4, 4, 1) if name == "planar" else (4, 3, 2))
-    assert rows[0]["feasible"] > 0
-    for row in rows:
-        assert row["wrong"] == 0
-        if METHODS[row["method"]].exact:
-            assert row["share"] == 1.0
-        assert 0.0 <= row["share"] <= 1.0
-        json.dumps(row.measured, allow_nan=False)
+@pytest.mark.parametrize("method", applicable_methods(PROBLEM))
+def test_exact_methods_solve_all_of_a_grid_and_no_verdict_is_wrong(method):
+    row = trials.cover("acrobot_large", (4, 3, 2), method)
+    assert row["feasible"] > 0
+    assert row["wrong"] == 0
+    assert 0.0 <= row["share"] <= 1.0
+    assert row["share"] == 1.0 or not METHODS[method].exact
 
 
-def test_grids_lie_inside_the_frame_and_some_methods_alone_are_the_same_rows():
-    assert len(grid_problems("acrobot_large", (3, 2, 2))) == 2 * 12
-    counts, some = (2, 2, 2), ("linear_program", "barycenter")
-    whole = {row["method"]: untimed(row) for row in cover("acrobot_large", counts)}
-    for method in some:
-        (row,) = cover("acrobot_large", counts, [method])
-        assert untimed(row) == whole[method]
+ROW = {"lost": False, "failures": 0, "position_error_max_m": 1e-6, "end_time_s": 1.0}
 
 
-def untimed(row):
-    return {name: row[name] for name in row.columns() if not name.endswith("_us")}
+@pytest.mark.parametrize(
+    ("error", "failures", "held"),
+    [(1e-3, 0, [True] * 2), (1e-9, 0, [False] * 3), (1e-9, 5, [False, False, True])],
+)
+def test_instability_is_a_fall_a_failure_or_a_larger_error(error, failures, held):
+    far = {"position_error_max_m": error}
+    pairs = [
+        ("thesis", "quadratic_program", 100.0, {}), ("thesis", "linear_program", 1200.0, far),
+        ("thesis", "quadratic_program", 1500.0, far), ("far_step", "quadratic_program", 1200.0, {}),
+        *(("slow", "quadratic_program", gain, {"failures": failures}) for gain in GAINS),
+    ]  # fmt: skip
+    rows = pd.DataFrame([
+        {"experiment": experiment, "method": method, "kp_per_s2": gain, "applied": "held", **ROW,
+         **numbers}
+        for experiment, method, gain, numbers in pairs
+    ])  # fmt: skip
+    assert near_instability(rows)[0] == held
