@@ -57,7 +57,8 @@ class Folder:
         self._arguments: Any = load_json(json.dumps(arguments))
         self._overwrite, self._grows = overwrite, grows
         self._files: list[str] = []
-        self._made = self._open_now = False
+        self._made: list[Path] = []
+        self._open_now = False
         self._lock = FileLock(self.path / LOCK)
         working, real = Path.cwd(), self.path.resolve()
         if real == working or real in working.parents or os.path.ismount(real):
@@ -76,7 +77,7 @@ class Folder:
                 process writes it.
         """
         with self.writing():
-            self._made = not self.path.exists()
+            self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
             self.path.mkdir(parents=True, exist_ok=True)
             try:
                 self._lock.acquire(timeout=0)
@@ -90,7 +91,7 @@ class Folder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Unlocks the folder, and removes it if nothing was written."""
+        """Unlocks the folder, and removes it and what was made above it if nothing was written."""
         self._release()
 
     def _open(self) -> None:
@@ -126,8 +127,8 @@ class Folder:
                 (self.path / MARKER).unlink()
             if [path.name for path in self.path.iterdir()] == [LOCK]:
                 (self.path / LOCK).unlink()
-            if self._made:
-                self.path.rmdir()  # which fails unless it is empty
+            for path in self._made:
+                path.rmdir()  # which fails unless it is empty
         self._lock.release()
 
     def claim(self, name: str) -> Path:

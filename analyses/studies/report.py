@@ -134,6 +134,8 @@ def reproduce(
         CdprError: A study is unknown, or the folder is not accepted.
     """
     names = list(STUDIES) if only is None else list(only)
+    if not names:
+        raise CdprError("only: found none; accepted: names of studies")
     for name in names:
         if name not in STUDIES:
             raise CdprError(f"only: study {name!r} is unknown; {closest(name, STUDIES)}")

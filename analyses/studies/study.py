@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections import Counter
+from collections import ChainMap, Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeAlias
+from typing import Any, TextIO, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -181,6 +181,7 @@ def run_study(
         raise CdprError(f"seeds: found {seeds}; accepted: 1 to {MOST_SEEDS}")
     form = Form(quick, seeds, recipe)
     arguments = arguments_of(one.name, form)
+    earlier = {} if runs_from is None else earlier_rows(Path(runs_from), arguments)
     with ExitStack() as stack:
         if folder is None:
             where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
@@ -188,8 +189,7 @@ def run_study(
             where = Path(folder)
         results = stack.enter_context(Folder(where, arguments, overwrite, grows=True))
         rows = stack.enter_context(RowStore(results))
-        if runs_from is not None:
-            rows.take_over(Path(runs_from), arguments)
+        rows.take_over(earlier)
         plan = [
             (keys, call, digest(call), case.alone)
             for case in one.cases(form) for keys, call in case.calls()
@@ -296,16 +296,18 @@ class RowStore:
         """Of an open folder."""
         self.folder, self.taken = folder, 0
         self.rows = read_rows(folder.path) if folder.resumed else {}
+        self._file: TextIO | None = None
 
     def __enter__(self) -> RowStore:
-        """Opens the file of rows, without a line that a kill has cut."""
-        whole = "".join(json.dumps([name, row]) + "\n" for name, row in self.rows.items())
-        self.folder.write_text(ROWS, whole)
-        self._file = (self.folder.path / ROWS).open("a", encoding="utf-8")
+        """Drops a line that a kill has cut."""
+        if self.rows:
+            whole = (json.dumps([name, row]) + "\n" for name, row in self.rows.items())
+            self.folder.write_text(ROWS, "".join(whole))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
     def __contains__(self, name: str) -> bool:
         return name in self.rows
@@ -322,24 +324,17 @@ class RowStore:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
         words = plain({key: value for key, value in row.items() if key not in arrays})
         with self.folder.writing():
+            if self._file is None:
+                self._file = self.folder.claim(ROWS).open("a", encoding="utf-8")
             self._file.write(json.dumps([name, words]) + "\n")
             self._file.flush()
         self.rows[name] = words
 
-    def take_over(self, other: Path, arguments: Mapping[str, Any]) -> None:
-        """Takes over rows that other code measured.
-
-        Raises:
-            CdprError: The folder is none of the same study in the same form.
-        """
-        marker = read_marker(other)
-        told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
-        if different := list(differences(told, dict(arguments))):
-            raise CdprError(f"runs_from: {other}: {different[0]}; accepted: a folder of this study")
-        for name, row in read_rows(other).items():
+    def take_over(self, earlier: Mapping[str, Row]) -> None:
+        """Takes over rows that other code measured, by digest."""
+        for name, row in earlier.items():
             if name not in self.rows:
-                path = other / ARRAYS / f"{name}.npz"
-                self.add(name, {**row, **(Arrays(path) if path.exists() else {})})
+                self.add(name, row)
                 self.taken += 1
 
     def in_order(self, plan: Plan, in_memory: bool) -> list[dict[str, Any]]:
@@ -359,6 +354,24 @@ def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
     path = folder / ROWS
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
     return dict(load_json(line) for line in lines if line.endswith("\n"))
+
+
+def earlier_rows(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Row]:
+    """Rows that other code measured, with their arrays, by digest.
+
+    Raises:
+        CdprError: The folder is none of the same study in the same form.
+    """
+    marker = read_marker(folder)
+    told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
+    if different := list(differences(told, dict(arguments))):
+        raise CdprError(f"runs_from: {folder}: {different[0]}; accepted: a folder of this study")
+    rows = read_rows(folder)
+    files = {name: folder / ARRAYS / f"{name}.npz" for name in rows}
+    return {
+        name: ChainMap(row, dict(Arrays(files[name])) if files[name].exists() else {})
+        for name, row in rows.items()
+    }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
