@@ -24,7 +24,6 @@ from cdpr_drake.analyses.studies.framework.statement import (
     statement,
 )
 from cdpr_drake.analyses.studies.framework.study import Form
-from cdpr_drake.analyses.studies.stability_ranges.question import unit_of_limit
 
 # Columns, keys and values that studies ask for: a misspelt one fails here, without a run. A name
 # that is asked of runs has to be written where nothing is asked, too: where a row is made, or a
@@ -322,14 +321,6 @@ def _plan(name):
     return study.plan(Form()), study.planned(Form())
 
 
-def answers(name, case):
-    """Columns by whose names checks of a study look for what was found."""
-    if name != "stability-ranges":
-        return ()
-    sought = case.keys["sought"].split(", ")[0]
-    return (f"searched_{'m3' if sought == 'workspace' else unit_of_limit(sought)}",)
-
-
 def made_runs(name, mutation, draw, exchanged=False):
     """Rows of all cases of a study; `exchanged`: those that another seed would have."""
     cases, planned = _plan(name)
@@ -339,8 +330,6 @@ def made_runs(name, mutation, draw, exchanged=False):
             printed = {} if exchanged else case.printed
             chance = zlib.crc32(f"{draw} {number} {seed} {exchanged}".encode())
             measured = Made(mutation, case.keys, printed, chance)
-            for name_of_answer in answers(name, case):
-                measured[name_of_answer]  # there from the start
             rows.append(Run(case.name, seed, case.keys, measured, case.printed))
     return Runs(rows, lambda: planned)
 
