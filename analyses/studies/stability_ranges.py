@@ -414,8 +414,8 @@ def planar_place_row() -> dict[str, float]:
 
 
 def planar_turn_row(error: float, d_error: float, shift: float) -> dict[str, float]:
-    """Planar analysis II: the largest turn of the camera, no value in the boxes of these half sizes
-    [m] failing."""
+    """Planar analysis II: the largest turn of the camera with which no value fails in boxes of
+    these half sizes [m]."""
     limits = PlanarVisionLimits(error, d_error, shift)
     return {"found_deg": bisected(lambda a: limits.worst_margin(math.radians(a)) > 0.0, 90.0, 0.1)}
 
@@ -438,7 +438,7 @@ def object_turn_row(error: float) -> dict[str, float]:
 # Analysis III, where the robot's model is wrong, too.
 
 
-PLANAR_OTHERS = RobotLimits(
+PLANAR_FINE = RobotLimits(
     place=0.2, psi=10.0, error=0.5, r_bp=0.01, d_theta_bp=3.0, r_s=0.05, r_pc=0.01,
     d_theta_pc=3.0, r_B=0.004,
 )  # fmt: skip
@@ -446,7 +446,7 @@ PLANAR_COARSE = RobotLimits(
     place=0.2, psi=10.0, error=1.0, r_bp=0.05, d_theta_bp=5.0, r_s=0.2, r_pc=0.01,
     d_theta_pc=10.0, r_B=0.008,
 )  # fmt: skip
-SPATIAL_OTHERS = RobotLimits(
+SPATIAL_FINE = RobotLimits(
     place=0.1, error=0.5, r_bp=0.03, d_theta_bp=3.0, r_s=0.05, r_pc=0.01, d_theta_pc=3.0,
     r_B=0.008, low=0.3, high=0.3,
 )  # fmt: skip
@@ -454,8 +454,8 @@ SPATIAL_COARSE = RobotLimits(
     place=0.1, error=1.0, r_bp=0.06, d_theta_bp=5.0, r_s=0.3, r_pc=0.01, d_theta_pc=10.0,
     r_B=0.008, low=0.3, high=0.3,
 )  # fmt: skip
-"""Limits that a combination has unless it says otherwise, and with everything known coarsely; r_B
-of the spatial robot as printed in 3.2.2."""
+"""Limits of the combinations of a series, but for those that vary: errors known well, and coarsely;
+r_B of the spatial robot as printed in 3.2.2."""
 
 OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_pc=10.0)
 """The same in the spatial analysis II."""
@@ -467,7 +467,7 @@ class Series:
 
     Attributes:
         group: Name.
-        others: Limits that are the same.
+        base: Limits that are the same.
         varied: Limits that vary, all with the same value.
         values: Values [m, deg].
         sought: What is sought in each.
@@ -476,7 +476,7 @@ class Series:
     """
 
     group: str
-    others: RobotLimits
+    base: RobotLimits
     varied: tuple[str, ...]
     values: tuple[float, ...]
     sought: Sought
@@ -500,29 +500,29 @@ OBJECT_SERIES = (
 """Of the spatial analysis II; theta u is zero."""
 
 PLANAR_SERIES = (
-    Series("place", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), Sought(("r_bp",), 0.4, 0.005),
+    Series("place", PLANAR_FINE, ("place",), (*PLACES, 0.45), Sought(("r_bp",), 0.4, 0.005),
            "eighths"),
-    Series("error", PLANAR_OTHERS, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0),
+    Series("error", PLANAR_FINE, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0),
            Sought(("r_s",), 2.0, 0.02)),
-    Series("r_pc", PLANAR_OTHERS, ("r_pc",), CAMERA_ERRORS, TURN),
+    Series("r_pc", PLANAR_FINE, ("r_pc",), CAMERA_ERRORS, TURN),
     Series("r_pc coarse", PLANAR_COARSE, ("r_pc",), CAMERA_ERRORS, TURN),
-    Series("r_B", PLANAR_OTHERS, ("r_B",), (0.0, 0.004, 0.008, 0.016, 0.03),
+    Series("r_B", PLANAR_FINE, ("r_B",), (0.0, 0.004, 0.008, 0.016, 0.03),
            Sought(("d_theta_bp",), 90.0, 1.0), "eighths"),
-    Series("psi", PLANAR_OTHERS, ("place",), (*PLACES, 0.45), TURN),
+    Series("psi", PLANAR_FINE, ("place",), (*PLACES, 0.45), TURN),
 )  # fmt: skip
-CENTRED = replace(SPATIAL_OTHERS, place=0.0)
+CENTRED = replace(SPATIAL_FINE, place=0.0)
 SPATIAL_SERIES = (
     *(
-        Series(f"{name} {what}{words}", others, (name,), POINT_ERRORS, sought)
-        for words, others in (("", SPATIAL_COARSE), (" well", SPATIAL_OTHERS))
+        Series(f"{name} {motion}{words}", base, (name,), POINT_ERRORS, sought)
+        for words, base in (("", SPATIAL_COARSE), (" well", SPATIAL_FINE))
         for name in ("r_bp", "r_pc")
-        for what, sought in (("psi", WIDE_TURN), ("tilt", TILT))
+        for motion, sought in (("psi", WIDE_TURN), ("tilt", TILT))
     ),
-    Series("psi tilt", SPATIAL_OTHERS, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), TILT),
-    Series("place r_bp", SPATIAL_OTHERS, ("place",), PLACES, PLACE, "eighths"),
+    Series("psi tilt", SPATIAL_FINE, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), TILT),
+    Series("place r_bp", SPATIAL_FINE, ("place",), PLACES, PLACE, "eighths"),
     Series("height r_bp", CENTRED, ("low", "high"), HEIGHTS, PLACE),
     Series("place psi", SPATIAL_COARSE, ("place",), PLACES, WIDE_TURN),
-    Series("place tilt", SPATIAL_OTHERS, ("place",), PLACES, TILT),
+    Series("place tilt", SPATIAL_FINE, ("place",), PLACES, TILT),
     Series("height tilt", CENTRED, ("low", "high"), HEIGHTS, TILT),
 )
 """Of analysis III. Places and angles are limits, each with everything within; heights are single
@@ -534,7 +534,7 @@ def robot_cases(quick: bool) -> Iterator[Case]:
     planar = LimitedRobot(PLANAR, steps=1 if quick else 2, mirrored=True, coarse=quick)
     for series in PLANAR_SERIES:
         yield from series_cases(PLANAR_ROBOT, planar, coarsened(series) if quick else series)
-    limits, sought = replace(PLANAR_OTHERS, place=0.3), Sought(("r_bp",), 0.4, CAMERA_STEP)
+    limits, sought = replace(PLANAR_FINE, place=0.3), Sought(("r_bp",), 0.4, CAMERA_STEP)
     for camera, place in CAMERAS.items():
         x, y, turn = place
         columns = {"camera_x": x, "camera_y": y, "camera_turn": turn, **limits.without("r_bp")}
@@ -542,7 +542,7 @@ def robot_cases(quick: bool) -> Iterator[Case]:
         call = partial(limit_row, robot, limits, sought)
         yield range_case(PLANAR_ROBOT, "camera", "r_bp", columns, call, camera=camera)
     for r_bp in AREAS:
-        limits = replace(PLANAR_OTHERS, r_bp=r_bp)
+        limits = replace(PLANAR_FINE, r_bp=r_bp)
         call = partial(area_row, limits, quick)
         yield range_case(PLANAR_ROBOT, "area", "workspace", limits.without("place", "psi"), call)
     robot = LimitedRobot(SPATIAL, coarse=quick)
@@ -554,7 +554,7 @@ def series_cases(section: str, robot: LimitedRobot, series: Series) -> Iterator[
     """All combinations of a series."""
     names = series.sought.names
     for value in series.values:
-        limits = series.others.varied(series.varied, value)
+        limits = series.base.varied(series.varied, value)
         call = partial(limit_row, robot, limits, series.sought, series.proof)
         yield range_case(section, series.group, ", ".join(names), limits.without(*names), call)
 

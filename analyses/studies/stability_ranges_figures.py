@@ -26,7 +26,7 @@ SECTIONS = (
 
 LARGEST = ("found_", "searched_")
 ANSWERS = ("printed_", *LARGEST, "certified_", "sampled_")
-"""With which columns begin that are no limits; of the first ones a row has one at most."""
+"""Beginnings of columns that are no limits; a row has one column of `LARGEST` at most."""
 
 LENGTHS = {
     "place": (r"$^b t_p$: $|x|, |y|$", "s"),
@@ -60,7 +60,7 @@ READINGS = {
 """Words for other readings of one wrong parameter."""
 
 LEAST_DRAWN_VOLUME, LEAST_DRAWN_LENGTH = 0.004, 1e-3
-"""What is less is drawn as this, to be seen [m^3], on a logarithmic axis [m]."""
+"""Smaller volumes [m^3] and lengths [m] are drawn as these, so that they can be seen."""
 
 PRINTED_PLACE, PRINTED_TURN, PRINTED_TURN_ERROR = 1.5, 160.0, 90.0
 """Largest limits of figure 3.3 [m, deg]."""

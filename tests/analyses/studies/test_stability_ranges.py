@@ -10,9 +10,9 @@ import pytest
 
 from cdpr_drake.analyses.studies.facts import facts_of, judged
 from cdpr_drake.analyses.studies.stability_ranges import (
-    PLANAR_OTHERS,
+    PLANAR_FINE,
     SECTIONS,
-    SPATIAL_OTHERS,
+    SPATIAL_FINE,
     STUDY,
     LimitedRobot,
     RobotLimits,
@@ -54,7 +54,7 @@ def test_limits_of_the_object_alone_are_those_of_the_closed_form():
 
 
 def test_samples_lie_within_limits_and_on_their_edges():
-    limits = replace(SPATIAL_OTHERS, psi=40.0, phi=20.0, theta=10.0, place=0.2)
+    limits = replace(SPATIAL_FINE, psi=40.0, phi=20.0, theta=10.0, place=0.2)
     poses, errors = LimitedRobot("acrobot_small").samples(limits)
     assert len(poses) == len(errors) == 9 * 3 * 3 * 7 * 7
     assert np.abs(poses[:, 4:6]).max(axis=0) == pytest.approx([0.2, 0.2])
@@ -63,14 +63,14 @@ def test_samples_lie_within_limits_and_on_their_edges():
     angles = 2.0 * np.degrees(np.arccos(np.abs(poses[:, 0])))
     assert angles.max() < 40.0 + 20.0 + 10.0
     assert angles.min() == pytest.approx(0.0, abs=1e-6)
-    planar, _ = LimitedRobot("planar", steps=2, mirrored=True).samples(PLANAR_OTHERS)
+    planar, _ = LimitedRobot("planar", steps=2, mirrored=True).samples(PLANAR_FINE)
     assert planar[:, 4:6].min() == 0.0
     assert planar[:, 1:3] == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("r_bp", [0.04, 0.05, 0.06, 0.07])
 def test_mirrored_places_stand_for_all(r_bp):
-    limits = replace(PLANAR_OTHERS, place=0.4, r_bp=r_bp)
+    limits = replace(PLANAR_FINE, place=0.4, r_bp=r_bp)
     mirrored = failing_sample(LimitedRobot("planar", mirrored=True), limits)
     assert (mirrored is None) == (failing_sample(LimitedRobot("planar"), limits) is None)
 
@@ -78,10 +78,10 @@ def test_mirrored_places_stand_for_all(r_bp):
 def test_larger_limits_are_not_easier():
     robot = LimitedRobot("planar", (0.03, 0.0, 20.0), coarse=True)
     sought = Sought(("r_bp",), 0.4, STEP)
-    row = limit_row(robot, PLANAR_OTHERS, sought, "steps")
+    row = limit_row(robot, PLANAR_FINE, sought, "steps")
     assert 0.0 < row["certified_m"] <= row["searched_m"] < 0.4
     for name in ("place", "error", "r_B", "r_pc", "d_theta_pc", "r_s", "d_theta_bp"):
-        larger = PLANAR_OTHERS.varied((name,), 2.0 * getattr(PLANAR_OTHERS, name))
+        larger = PLANAR_FINE.varied((name,), 2.0 * getattr(PLANAR_FINE, name))
         assert largest_limit(robot, larger, sought) <= row["searched_m"]
 
 
@@ -176,8 +176,8 @@ MADE_UP = [
 
 
 def verdicts(rows):
-    found = judged(facts_of("stability-ranges"), pd.DataFrame(rows), STUDY.finds, {}, "")
-    return {one["name"]: one["verdict"] for one in found}
+    facts = judged(facts_of("stability-ranges"), pd.DataFrame(rows), STUDY.finds, {}, "")
+    return {fact["name"]: fact["verdict"] for fact in facts}
 
 
 @pytest.mark.parametrize(("name", "largest", "verdict"), MADE_UP)
@@ -195,8 +195,8 @@ def test_heights_are_a_test():
     def answer(keys):
         return shrinking(keys) - (keys["high_m"] == 0.6 and keys["group"].startswith("height"))
 
-    found = verdicts(made_up(answer))
-    assert found["place_error"] == found["place_rotation"] == "in part"
+    outcome = verdicts(made_up(answer))
+    assert outcome["place_error"] == outcome["place_rotation"] == "in part"
 
 
 VOLUMES = (
@@ -206,12 +206,12 @@ VOLUMES = (
 
 
 def test_printed_volumes_confirm_and_each_part_can_fail():
-    found = verdicts(made_up())
-    assert {found[name] for name in VOLUMES} == {"confirmed"}
-    assert found["camera_turn"] == "met (fitted)"
-    found = verdicts(made_up(volume=lambda keys: 0.6))
-    assert {found[name] for name in VOLUMES} == {"not confirmed"}
-    assert found["camera_turn"] == "in part"
+    outcome = verdicts(made_up())
+    assert {outcome[name] for name in VOLUMES} == {"confirmed"}
+    assert outcome["camera_turn"] == "met (fitted)"
+    outcome = verdicts(made_up(volume=lambda keys: 0.6))
+    assert {outcome[name] for name in VOLUMES} == {"not confirmed"}
+    assert outcome["camera_turn"] == "in part"
     for turn in (40.0, 55.0, 65.0):
         rows = made_up(volume=lambda keys, turn=turn: (
             0.3 if keys.get("d_theta_pc_deg") == turn else keys["printed_m3"]
