@@ -658,7 +658,7 @@ def limits_table(rows: Frame, section: str) -> Frame:
     words = [limit_words(row) for row in combinations.to_dict("records")]
     answers = combinations[[name for name in combinations if name.startswith(ANSWERS)]]
     table = combinations[["group", "sought"]].assign(limits=words)
-    return table.join(answers.dropna(axis=1, how="all"))
+    return table.join(answers.dropna(axis=1, how="all").astype(object).fillna(""))
 
 
 def object_table(rows: Frame) -> Frame:
@@ -666,7 +666,8 @@ def object_table(rows: Frame) -> Frame:
     (rows) and of its error (columns) [deg]."""
     places = select(rows, section=SPATIAL_VISION, group="place")
     table = places.pivot_table("found_m", "theta_u_deg", "d_theta_s_deg")
-    return table.rename(columns="error of {:g} deg".format).reset_index()
+    table = table.rename(columns="error of {:g} deg".format)
+    return table.rename_axis(columns=None).reset_index()
 
 
 def parameters(form: Form) -> Mapping[str, Any]:
