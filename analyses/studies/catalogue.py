@@ -68,7 +68,6 @@ class StudyEntry:
 
 
 MODULES = {
-    "stability-ranges": "stability_ranges.study",
     "basin": "basin.study",
     "design": "design",
     "scenarios": "scenarios",

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections import ChainMap, Counter
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -181,7 +181,8 @@ def run_study(
         raise CdprError(f"seeds: found {seeds}; accepted: 1 to {MOST_SEEDS}")
     form = Form(quick, seeds, recipe)
     arguments = arguments_of(one.name, form)
-    earlier = {} if runs_from is None else earlier_rows(Path(runs_from), arguments)
+    if runs_from is not None:
+        check_earlier(Path(runs_from), arguments)
     with ExitStack() as stack:
         if folder is None:
             where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
@@ -189,7 +190,8 @@ def run_study(
             where = Path(folder)
         results = stack.enter_context(Folder(where, arguments, overwrite, grows=True))
         rows = stack.enter_context(RowStore(results))
-        rows.take_over(earlier)
+        if runs_from is not None:
+            rows.take_over(Path(runs_from))
         plan = [
             (keys, call, digest(call), case.alone)
             for case in one.cases(form) for keys, call in case.calls()
@@ -330,11 +332,12 @@ class RowStore:
             self._file.flush()
         self.rows[name] = words
 
-    def take_over(self, earlier: Mapping[str, Row]) -> None:
-        """Takes over rows that other code measured, by digest."""
-        for name, row in earlier.items():
+    def take_over(self, other: Path) -> None:
+        """Takes over rows that other code measured in a folder."""
+        for name, row in read_rows(other).items():
             if name not in self.rows:
-                self.add(name, row)
+                path = other / ARRAYS / f"{name}.npz"
+                self.add(name, {**row, **(Arrays(path) if path.exists() else {})})
                 self.taken += 1
 
     def in_order(self, plan: Plan, in_memory: bool) -> list[dict[str, Any]]:
@@ -356,22 +359,16 @@ def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
     return dict(load_json(line) for line in lines if line.endswith("\n"))
 
 
-def earlier_rows(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Row]:
-    """Rows that other code measured, with their arrays, by digest.
+def check_earlier(folder: Path, arguments: Mapping[str, Any]) -> None:
+    """Refuses a folder that has no rows of the same study in the same form.
 
     Raises:
-        CdprError: The folder is none of the same study in the same form.
+        CdprError: It has none.
     """
     marker = read_marker(folder)
     told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
     if different := list(differences(told, dict(arguments))):
         raise CdprError(f"runs_from: {folder}: {different[0]}; accepted: a folder of this study")
-    rows = read_rows(folder)
-    files = {name: folder / ARRAYS / f"{name}.npz" for name in rows}
-    return {
-        name: ChainMap(row, dict(Arrays(files[name])) if files[name].exists() else {})
-        for name, row in rows.items()
-    }
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -567,7 +564,8 @@ STUDIES = {
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
     "case-10": "case_10", "mobile-robot": "mobile_robot",
     "control-stability": "control_stability",
-    "stability-shapes": "stability_shapes", "stability-closed-loop": "closed_loops",
+    "stability-ranges": "stability_ranges", "stability-shapes": "stability_shapes",
+    "stability-closed-loop": "closed_loops",
     "schemes": "schemes", "fusion": "fusion",
     "seen-slack": "seen_slack", "failure": "failures", "detection": "failures",
     "calibration": "calibration", "identification": "identification",
