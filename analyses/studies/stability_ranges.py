@@ -21,12 +21,6 @@ from typing import Any, Literal
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.studies.stability_recipe import (
-    DRAWS,
-    recipe_case,
-    recipe_grid,
-    single_bounds,
-)
 from cdpr_drake.analyses.studies.stability_ranges_figures import (
     ANSWERS,
     PLANAR_ROBOT,
@@ -40,6 +34,12 @@ from cdpr_drake.analyses.studies.stability_ranges_figures import (
     limit_words,
     object_figure,
     single_figure,
+)
+from cdpr_drake.analyses.studies.stability_recipe import (
+    DRAWS,
+    recipe_case,
+    recipe_grid,
+    single_bounds,
 )
 from cdpr_drake.analyses.studies.study import Call, Case, Form, Frame, Study, select
 from cdpr_drake.analyses.workspaces.stability_question import PRINTED
