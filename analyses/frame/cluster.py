@@ -7,13 +7,14 @@ worker unseen, and so that a worker that hangs keeps its own batches only.
 from __future__ import annotations
 
 import logging
+import pickle
 import queue
 import time
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -226,10 +227,13 @@ class _Cluster:
         return batch
 
     def _submit(self, batch: _Batch, place: str) -> None:
+        import cloudpickle  # comes with Dask
+
         jobs = [(number, self._jobs[number]) for number in batch.numbers]
+        call = cloudpickle.dumps(_Call(do_batch, self._call, jobs, code_version()))
         future = self._client.submit(
-            do_batch, self._call, jobs, code_version(), pure=False, workers=[place],
-            allow_other_workers=False, key=f"{self._name}-{uuid.uuid4()}",
+            pickle.loads, call, pure=False, workers=[place], allow_other_workers=False,
+            key=f"{self._name}-{uuid.uuid4()}",
         )  # fmt: skip
         batch.places[place] = future
         future.add_done_callback(lambda ended: self._ended.put((batch, place, ended)))
@@ -253,8 +257,17 @@ class _Cluster:
         self._batches.remove(batch)
         self._seconds += seconds
         self._done += len(finished)
-        for one in finished:
-            yield FinishedJob(one.number, one.result, one.problem, place)
+        yield from (replace(job, place=place) for job in finished)
+
+
+class _Call:
+    """A call that is made where its pickle is read: schedulers only hand its bytes on."""
+
+    def __init__(self, function: Callable[..., Any], *arguments: Any) -> None:
+        self._call = function, arguments
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return self._call
 
 
 def do_batch(

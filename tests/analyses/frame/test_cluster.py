@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -90,6 +92,42 @@ def test_workers_with_other_code_are_refused_by_name(local, monkeypatch):
     with pytest.raises(SweepError, match=r"no worker can do the jobs\. tcp://.*accepted: 0\.0 of"):
         list(finished_jobs(square, range(3), local.scheduler_address, say=lines.append))
     assert any("is not used: it has cdpr_drake" in line for line in lines)
+
+
+@pytest.fixture
+def scattered(tmp_path):
+    """Starts a scheduler without this package, and workers with or without it, as programs."""
+    (tmp_path / "cdpr_drake.py").write_text("raise ModuleNotFoundError('no cdpr_drake')")
+    file = tmp_path / "scheduler.json"
+    words = ("--scheduler-file", str(file), "--no-dashboard")
+    programs = []
+
+    def start(*more, has_package):
+        place = {} if has_package else {"cwd": tmp_path}  # modules of which are found first
+        command = [sys.executable, "-m", "dask", *more, *words]
+        programs.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, **place))
+
+    def cluster(has_package):
+        start("scheduler", "--host", "127.0.0.1", "--port", "0", has_package=False)
+        start("worker", "--nthreads", "1", "--no-nanny", has_package=has_package)
+        while not file.exists():
+            time.sleep(0.05)
+        return str(file)
+
+    yield cluster
+    for program in programs:
+        program.kill()
+        program.wait()
+
+
+def test_a_scheduler_needs_no_package(scattered):
+    finished = list(finished_jobs(square, range(5), scattered(True)))
+    assert sorted(one.result for one in finished) == [0, 1, 4, 9, 16]
+
+
+def test_workers_without_the_package_are_named(scattered):
+    with pytest.raises(SweepError, match="no worker can do the jobs.*no cdpr_drake"):
+        list(finished_jobs(square, range(5), scattered(False)))
 
 
 def test_without_workers_it_says_so_and_gives_up(monkeypatch):
