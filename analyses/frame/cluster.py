@@ -299,7 +299,9 @@ def _connected(scheduler: str) -> Iterator[Any]:
             f"workers: found {scheduler}, and Dask is not installed; pip install "
             "'cdpr_drake[cluster]'"
         ) from problem
-    loggers = [logging.getLogger(name) for name in ("distributed", "asyncio", "tornado")]
+    libraries = ("distributed", "asyncio", "tornado")  # loggers below them have levels, too
+    names = [name for name in logging.root.manager.loggerDict if name.startswith(libraries)]
+    loggers = [logging.getLogger(name) for name in names]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)

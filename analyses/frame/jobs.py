@@ -132,6 +132,8 @@ def do_job(work: Callable[[Job], Result], job: Job, number: int) -> FinishedJob[
         return FinishedJob(number, work(job))
     except Exception as problem:
         return FinishedJob(number, problem=problem)
+    except SystemExit as end:  # else a worker of a cluster ends, and others do the job again
+        return FinishedJob(number, problem=SweepError(f"SystemExit: {end}"))
 
 
 def portable(finished: FinishedJob[Result]) -> FinishedJob[Result]:

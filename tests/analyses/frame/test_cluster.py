@@ -50,8 +50,9 @@ def fails(number):
     return number
 
 
-def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local):
+def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local, capfd):
     finished = {one.number: one for one in finished_jobs(fails, range(8), local.scheduler_address)}
+    assert capfd.readouterr().err == ""
     assert sorted(finished) == list(range(8))
     assert finished[2].words().startswith("ValueError: two (on worker tcp://")
     assert isinstance(finished[4].problem, ProcessDied)
@@ -126,7 +127,7 @@ def test_a_scheduler_needs_no_package(scattered):
 
 
 def test_workers_without_the_package_are_named(scattered):
-    with pytest.raises(SweepError, match="no worker can do the jobs.*no cdpr_drake"):
+    with pytest.raises(SweepError, match=r"no worker can do the jobs.*no cdpr_drake"):
         list(finished_jobs(square, range(5), scattered(False)))
 
 
