@@ -45,8 +45,8 @@ LOOK = 1.0
 """Time between two looks at the workers [s]."""
 
 SILENCE = 30.0
-"""A worker without a heartbeat for so long hangs, or holds the interpreter's lock in a long call;
-others do its batches, too [s]."""
+"""A scheduler without an answer for so long is lost [s]. A worker without a heartbeat hangs, or
+holds the interpreter's lock in a long call; others do its batches, too."""
 
 NO_WORKER = 8.0, 300.0
 """Times without a worker until it is said, and until the command gives up [s]."""
@@ -142,17 +142,17 @@ class _Cluster:
             return
         self._looked = now
         try:
-            workers = self._client.scheduler_info()["workers"]
-            self._threads = dict(self._client.nthreads())
+            identity = self._client.scheduler.identity
+            workers = self._client.sync(identity, callback_timeout=SILENCE)["workers"]
         except Exception as problem:
             raise SweepError(
                 f"{self._scheduler}: the scheduler was lost; what was finished is kept: run again "
                 "to go on"
             ) from problem
-        for place in self._threads:
-            seen = float(workers.get(place, {}).get("last_seen", 0.0))
-            if place not in self._heard or self._heard[place][0] != seen:
-                self._heard[place] = (seen, now)
+        self._threads = {place: worker["nthreads"] for place, worker in workers.items()}
+        for place, worker in workers.items():
+            if place not in self._heard or self._heard[place][0] != worker["last_seen"]:
+                self._heard[place] = (worker["last_seen"], now)
         if set(self._threads) - set(self._refused):
             self._alone_since, self._told = now, False
             return

@@ -113,7 +113,7 @@ def scattered(tmp_path):
         start("worker", "--nthreads", "1", "--no-nanny", has_package=has_package)
         while not file.exists():
             time.sleep(0.05)
-        return str(file)
+        return str(file), programs
 
     yield cluster
     for program in programs:
@@ -122,13 +122,25 @@ def scattered(tmp_path):
 
 
 def test_a_scheduler_needs_no_package(scattered):
-    finished = list(finished_jobs(square, range(5), scattered(True)))
+    finished = list(finished_jobs(square, range(5), scattered(True)[0]))
     assert sorted(one.result for one in finished) == [0, 1, 4, 9, 16]
 
 
 def test_workers_without_the_package_are_named(scattered):
     with pytest.raises(SweepError, match=r"no worker can do the jobs.*no cdpr_drake"):
-        list(finished_jobs(square, range(5), scattered(False)))
+        list(finished_jobs(square, range(5), scattered(False)[0]))
+
+
+def test_a_scheduler_that_hangs_is_lost_in_time(scattered, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    file, (scheduler, _) = scattered(True)
+    finished = finished_jobs(wait_and_name, range(1000), file)
+    next(finished)
+    scheduler.send_signal(signal.SIGSTOP)
+    began = time.monotonic()
+    with pytest.raises(SweepError, match="the scheduler was lost; what was finished is kept"):
+        list(finished)
+    assert time.monotonic() - began < 10.0
 
 
 def test_without_workers_it_says_so_and_gives_up(monkeypatch):
