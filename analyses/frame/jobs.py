@@ -96,6 +96,8 @@ def finished_jobs(
     Raises:
         SweepError: The number of workers is not accepted, or the cluster cannot be used.
     """
+    if not jobs:
+        return
     if isinstance(workers, str):
         from cdpr_drake.analyses.frame.cluster import cluster_jobs
 

@@ -47,8 +47,9 @@ def test_every_job_gives_its_result(workers):
     assert sorted((one.number, one.result) for one in finished) == [(k, k * k) for k in range(9)]
 
 
-def test_nothing_to_do_starts_nothing():
-    assert list(finished_jobs(square, [], 2)) == []
+@pytest.mark.parametrize("workers", [2, "tcp://127.0.0.1:9"])
+def test_nothing_to_do_starts_nothing(workers):
+    assert list(finished_jobs(square, [], workers)) == []
 
 
 def test_a_job_that_raises_or_whose_process_dies_is_named_and_others_go_on():
