@@ -153,8 +153,11 @@ class _Cluster:
         for place, worker in workers.items():
             if place not in self._heard or self._heard[place][0] != worker["last_seen"]:
                 self._heard[place] = (worker["last_seen"], now)
-        if set(self._threads) - set(self._refused):
-            self._alone_since, self._told = now, False
+        if usable := set(self._threads) - set(self._refused):
+            silent = all(map(self._hangs, usable))
+            if silent and not self._told:
+                self._say(f"{self._scheduler}: waits for workers; none answers")
+            self._alone_since, self._told = now, silent
             return
         refusals = "; ".join(f"{place}: {why}" for place, why in self._refused.items())
         if now - self._alone_since > NO_WORKER[1] or (refusals and not self._batches):
@@ -227,10 +230,10 @@ class _Cluster:
         return batch
 
     def _submit(self, batch: _Batch, place: str) -> None:
-        import cloudpickle  # comes with Dask
+        from distributed.protocol.pickle import dumps
 
         jobs = [(number, self._jobs[number]) for number in batch.numbers]
-        call = cloudpickle.dumps(_Call(do_batch, self._call, jobs, code_version()))
+        call = dumps(_Call(do_batch, self._call, jobs, code_version()))
         future = self._client.submit(
             pickle.loads, call, pure=False, workers=[place], allow_other_workers=False,
             key=f"{self._name}-{uuid.uuid4()}",
@@ -239,7 +242,7 @@ class _Cluster:
         future.add_done_callback(lambda ended: self._ended.put((batch, place, ended)))
 
     def _results(self, batch: _Batch, place: str, future: Any) -> Iterator[FinishedJob[Any]]:
-        if batch not in self._batches or batch.places.get(place) is not future:
+        if batch not in self._batches or id(future) != id(batch.places.get(place)):
             return
         try:
             seconds, finished = future.result(timeout=SCHEDULER_TIMEOUT)

@@ -65,16 +65,39 @@ def wait_and_name(number):
     return os.getpid()
 
 
-def test_a_worker_that_hangs_holds_nobody_up(local, monkeypatch):
-    monkeypatch.setattr(module, "SILENCE", 2.0)
+@pytest.fixture
+def workers(local):
+    """Process ids of the two workers."""
     with distributed.Client(local.scheduler_address, set_as_default=False) as client:
-        ids = list(client.run(os.getpid).values())
-    os.kill(ids[0], signal.SIGSTOP)
+        client.wait_for_workers(2)  # those that died are replaced
+        return list(client.run(os.getpid).values())
+
+
+def test_a_worker_that_hangs_holds_nobody_up(local, workers, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    os.kill(workers[0], signal.SIGSTOP)
     try:
         finished = list(finished_jobs(wait_and_name, range(40), local.scheduler_address))
     finally:
-        os.kill(ids[0], signal.SIGCONT)
+        os.kill(workers[0], signal.SIGCONT)
     assert sorted(one.number for one in finished) == list(range(40))
+
+
+def test_it_says_so_if_no_worker_answers(local, workers, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    lines = []
+
+    def say(words):
+        lines.append(words)
+        if "none answers" in words:
+            for process in workers:
+                os.kill(process, signal.SIGCONT)
+
+    for process in workers:
+        os.kill(process, signal.SIGSTOP)
+    finished = list(finished_jobs(square, range(9), local.scheduler_address, say=say))
+    assert len(finished) == 9
+    assert len(lines) == 2
 
 
 def test_jobs_see_files_as_they_were_read_here(local, tmp_path):
