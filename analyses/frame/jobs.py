@@ -163,8 +163,9 @@ def _in_processes(
                 busy[process.connection] = process
             if not busy:
                 return
-            for connection in wait(list(busy), POLL):
-                process = busy.pop(connection)  # type: ignore[arg-type]
+            ready = wait(list(busy), POLL)
+            for connection in [connection for connection in busy if connection in ready]:
+                process = busy.pop(connection)
                 finished = process.finished()
                 if isinstance(finished.problem, ProcessDied) or process.jobs >= JOBS_PER_PROCESS:
                     process.end()
