@@ -69,11 +69,7 @@ class StudyEntry:
 
 MODULES = {
     "stability-ranges": "stability_ranges.study",
-    "basin": "basin.study",
-    "design": "design",
     "scenarios": "scenarios",
-    "planning": "planning.study",
-    "proven-paths": "proven_paths.study",
     "pick-and-place": "pick_and_place",
     "tagless": "tagless",
     "lenses": "lenses",
