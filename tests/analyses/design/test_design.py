@@ -16,7 +16,7 @@ from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.front.design import optimize_design
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.progress import WorkSession
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import load_robot
@@ -94,17 +94,17 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, candidates
     pytest.importorskip("cmaes")
     settings = wanted("wrench-feasible")
     whole = search_design(ROBOT, candidates, settings)
-    session = StudySession(tmp_path / "one", should_stop=stopped_after(6))
+    session = WorkSession(tmp_path / "one", should_stop=stopped_after(6))
     part = search_design(ROBOT, candidates, settings, session)
     assert part.interrupted
     assert 0 < len(part.values) < len(whole.values)
-    again = search_design(ROBOT, candidates, settings, StudySession(tmp_path / "one"))
+    again = search_design(ROBOT, candidates, settings, WorkSession(tmp_path / "one"))
     assert not again.interrupted
     assert again.progress.found >= len(part.values)
     assert np.array_equal(again.values, whole.values)
     assert np.array_equal(again.coordinates, whole.coordinates)
     more = search_design(
-        ROBOT, candidates, replace(settings, generations=4), StudySession(tmp_path / "one")
+        ROBOT, candidates, replace(settings, generations=4), WorkSession(tmp_path / "one")
     )
     assert len(more.values) == len(whole.values) + 4
     assert more.progress.found == len(whole.values)
@@ -260,9 +260,9 @@ def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(
     found = make_candidates(ROBOT, settings, "test")
     whole = search_design(ROBOT, found, settings)
     assert len(whole.scores) <= 8
-    stopped = StudySession(tmp_path / "one", should_stop=stopped_after(5))
+    stopped = WorkSession(tmp_path / "one", should_stop=stopped_after(5))
     assert search_design(ROBOT, found, settings, stopped).interrupted
-    again = search_design(ROBOT, found, settings, StudySession(tmp_path / "one"))
+    again = search_design(ROBOT, found, settings, WorkSession(tmp_path / "one"))
     np.testing.assert_array_equal(again.values, whole.values)
     assert not again.interrupted
     pytest.importorskip("cmaes")

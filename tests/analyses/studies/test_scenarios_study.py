@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.progress import WorkSession
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.studies import scenarios
 from cdpr_drake.analyses.studies.framework.runs import Run, Runs
@@ -106,7 +106,7 @@ def test_every_scenario_ends_as_its_file_says_and_does_what_its_title_names(name
 
 
 def test_one_that_loses_its_target_is_named(tmp_path):
-    study = replace(STUDY, measure=made_up)(False, StudySession(workers=1))
+    study = replace(STUDY, measure=made_up)(False, WorkSession(workers=1))
     verdicts = {s.name: (s.verdict, s.found) for s in study.statements}
     assert verdicts["scenarios_expect_an_end"][0] == "confirmed"
     verdict, found = verdicts["scenarios_end_as_expected"]
@@ -129,7 +129,7 @@ def test_errors_beyond_what_is_expected_and_files_that_expect_nothing_are_named(
             return row | {"close_enough": False, "distance_share": 3.0}
         return row | {"expected": None, "as_expected": False} if case.name == LOST else row
 
-    study = replace(STUDY, measure=worse)(False, StudySession(workers=1))
+    study = replace(STUDY, measure=worse)(False, WorkSession(workers=1))
     verdicts = {s.name: (s.verdict, s.found) for s in study.statements}
     assert verdicts["scenarios_expect_an_end"][0] == "in part"
     assert verdicts["scenarios_expect_an_end"][1].endswith(f"; not {LOST}")
