@@ -71,14 +71,8 @@ MODULES = {
     "stability-ranges": "stability_ranges.study",
     "basin": "basin.study",
     "design": "design",
-    "scenarios": "scenarios",
     "planning": "planning.study",
     "proven-paths": "proven_paths.study",
-    "pick-and-place": "pick_and_place",
-    "tagless": "tagless",
-    "lenses": "lenses",
-    "adaptation": "adaptation",
-    "pan-tilt": "pan_tilt",
 }
 """Modules of this room by study, in the order in which the command line lists them.
 

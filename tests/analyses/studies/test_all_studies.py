@@ -157,7 +157,6 @@ UNNAMED = {
         "two_programs", "homing_tensions", "border_tensions", "equally_tensed", "two_cables_more",
         "polygon_shrinks", "keeps_limits", "pushes",
     },
-    "pick-and-place": {"one_camera_fails"},
     "case-9": {"sensor_accuracy"},
 }  # fmt: skip
 """Checks of sources that name no cause, by study: where one does not hold, why is not known, or its
@@ -362,7 +361,7 @@ tables within a row, or whether platforms are lost, or judge printed numbers alo
 own make them fail."""
 
 OTHER_ROWS = (
-    "worked-examples", "pick-and-place",
+    "worked-examples",
 )  # fmt: skip
 """Studies whose rows are solids, polygons, lists and counts; their own tests make each check
 fail."""

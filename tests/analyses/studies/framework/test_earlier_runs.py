@@ -157,10 +157,10 @@ def test_a_file_of_nonsense_is_one_line(earlier, tmp_path, text):
 
 
 def test_the_front_door_refuses_before_anything_is_written(earlier, tmp_path):
-    with pytest.raises(OutputFolderError, match='found study "tiny"; accepted: "tagless"'):
-        run_study("tagless", tmp_path / "now", runs_from=earlier)
+    with pytest.raises(OutputFolderError, match='found study "tiny"; accepted: "stability-ranges"'):
+        run_study("stability-ranges", tmp_path / "now", runs_from=earlier)
     with pytest.raises(CdprError, match="runs_from: accepted with a folder"):
-        run_study("tagless", runs_from=earlier)
+        run_study("stability-ranges", runs_from=earlier)
     assert not (tmp_path / "now").exists()
 
 
