@@ -1,3 +1,4 @@
+from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
@@ -15,7 +16,6 @@ from .analyses.front.planning import plan_free_motion as plan_free_motion
 from .analyses.front.planning import plan_path as plan_path
 from .analyses.front.proven_motions import plan_proven_motion as plan_proven_motion
 from .analyses.front.reconfiguration import reconfigure as reconfigure
-from .analyses.front.reproduction import reproduce as reproduce
 from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
@@ -29,13 +29,17 @@ from .analyses.front.statics import plot as plot
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.front.statics import solve_inverse_kinematics as solve_inverse_kinematics
 from .analyses.front.statics import solve_static as solve_static
-from .analyses.front.studies import run_study as run_study
-from .analyses.front.studies import studies as studies
 from .analyses.front.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
 from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .analyses.logs.log_request import LogRequest as LogRequest
+from .analyses.studies.report import reproduce as reproduce
+from .analyses.studies.study import Case as Case
+from .analyses.studies.study import Form as Form
+from .analyses.studies.study import Study as Study
+from .analyses.studies.study import run_study as run_study
+from .analyses.studies.study import studies as studies
 from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError

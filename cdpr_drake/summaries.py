@@ -52,17 +52,9 @@ class Tabulated(Summarized):
         """Columns by name, in SI units and radians unless a name says otherwise, all as long."""
 
     def to_dataframe(self) -> Any:
-        """The columns as a pandas DataFrame.
+        """The columns as a pandas DataFrame."""
+        import pandas as pd  # some half a second, which few need
 
-        Raises:
-            ImportError: pandas is not installed; `columns` has the same.
-        """
-        try:
-            import pandas as pd  # type: ignore[import-untyped, import-not-found, unused-ignore]
-        except ImportError as problem:
-            raise ImportError(
-                "to_dataframe: pandas is not installed; columns() has the same as arrays"
-            ) from problem
         return pd.DataFrame(dict(self.columns()))
 
 

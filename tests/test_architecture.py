@@ -136,21 +136,6 @@ def test_no_public_name_is_a_module_of_its_room(name):
     assert not set(import_module(name).__all__) & beside
 
 
-def test_no_study_is_known_but_to_the_catalogue():
-    """And what is above it; the catalogue knows all, so that a study that knew it, or what is
-    above it, would make a circle."""
-    room = "cdpr_drake.analyses.studies."
-    wrong = []
-    for name in sorted(FILES):
-        for module, _ in read(name).imports:
-            study = module.removeprefix(room).partition(".")[0] if module.startswith(room) else ""
-            shared = study in ("", "catalogue", "framework", "published")
-            own = f"{name}.".startswith(f"{room}{study}.")
-            if not shared and not own and name != f"{room}catalogue":
-                wrong.append(f"{name} imports from {module}")
-    assert not wrong, "\n".join(wrong)
-
-
 def test_files_have_no_circles():
     """Imports under TYPE_CHECKING and inside functions count; the sorter raises CycleError."""
     graph = {}

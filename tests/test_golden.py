@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.study import STUDIES
 from tests.golden import __main__ as golden
 from tests.golden import making
 from tests.golden.comparison import MADE_BY

@@ -10,13 +10,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.analyses.studies.published.stability_recipe import (
+from cdpr_drake.analyses.studies.stability_recipe import (
     DRAWS,
     recipe_bounds,
     recipe_case,
     recipe_grid,
 )
-from cdpr_drake.analyses.studies.published.stability_tables import TABLES
+from cdpr_drake.analyses.studies.stability_tables import TABLES
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import cross_matrix, rotation_from_vector
 from cdpr_drake.servoing.pose_features import theta_u_interaction

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.calibration.row_figure import row_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS

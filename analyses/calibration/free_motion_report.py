@@ -16,7 +16,7 @@ from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS,
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR

@@ -19,7 +19,7 @@ from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import column_names, write_scenario, write_whole
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Pose

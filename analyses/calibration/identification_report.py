@@ -15,7 +15,7 @@ from cdpr_drake.analyses.calibration.identified_robots import identified_robot
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR

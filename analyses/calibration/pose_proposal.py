@@ -17,7 +17,7 @@ from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.candidate_poses import in_short_hops, rest_poses
 from cdpr_drake.analyses.calibration.motion_start import off_plane
 from cdpr_drake.analyses.reporting.log_files import finite, write_whole
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import (

@@ -23,9 +23,9 @@ from cdpr_drake.analyses.design.search import (
 )
 from cdpr_drake.analyses.design.settings import DesignSettings
 from cdpr_drake.analyses.reporting.progress import (
-    DEFAULT_STUDY_SESSION,
-    StudySession,
+    NOBODY_FOLLOWS,
     WorkProgress,
+    WorkSession,
 )
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.arrays import Array
@@ -175,7 +175,7 @@ class DesignProgram(OwnTerms):
         binding = self._prog.AddCost(_CostOf(_ByDifferences(cost)), vars=self._z)
         return self._named(binding, "cost", name or ", ".join(asked))
 
-    def Solve(self, session: StudySession = DEFAULT_STUDY_SESSION) -> DesignSearch:
+    def Solve(self, session: WorkSession = NOBODY_FOLLOWS) -> DesignSearch:
         """The design: two are in the result with own terms, the present robot and what was found.
 
         Args:

@@ -14,7 +14,7 @@ from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_popula
 from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
 from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
-from cdpr_drake.analyses.reporting.progress import DEFAULT_STUDY_SESSION, StudySession, WorkProgress
+from cdpr_drake.analyses.reporting.progress import NOBODY_FOLLOWS, WorkProgress, WorkSession
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.sweeps.folder import SweepFolder
 from cdpr_drake.analyses.sweeps.sweep import STARTING, run_sweep
@@ -160,7 +160,7 @@ def search_design(
     robot: Robot | str,
     candidates: Candidates,
     settings: DesignSettings,
-    session: StudySession = DEFAULT_STUDY_SESSION,
+    session: WorkSession = NOBODY_FOLLOWS,
 ) -> DesignSearch:
     """Searches the best design of each set of cables by CMA-ES.
 
@@ -277,7 +277,7 @@ class _Record:
 
     def __init__(
         self,
-        session: StudySession,
+        session: WorkSession,
         score: Callable[[Array], Array],
         total: int,
         pool: PersistentPool,
@@ -322,7 +322,8 @@ class _Record:
             self.progress, what=words, done=len(self.values) + progress.done,
             wall_time=self._wall + progress.wall_time, found=self._earlier + progress.found,
         )  # fmt: skip
-        self._session.tell(self.progress)
+        if self._session.on_progress is not None:
+            self._session.on_progress(self.progress)
 
 
 def search_arguments(

@@ -7,13 +7,14 @@ worker unseen, and so that a worker that hangs keeps its own batches only.
 from __future__ import annotations
 
 import logging
+import pickle
 import queue
 import time
 import uuid
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,8 +45,8 @@ LOOK = 1.0
 """Time between two looks at the workers [s]."""
 
 SILENCE = 30.0
-"""A worker without a heartbeat for so long hangs, or holds the interpreter's lock in a long call;
-others do its batches, too [s]."""
+"""A scheduler without an answer for so long is lost [s]. A worker without a heartbeat hangs, or
+holds the interpreter's lock in a long call; others do its batches, too."""
 
 NO_WORKER = 8.0, 300.0
 """Times without a worker until it is said, and until the command gives up [s]."""
@@ -141,19 +142,22 @@ class _Cluster:
             return
         self._looked = now
         try:
-            workers = self._client.scheduler_info()["workers"]
-            self._threads = dict(self._client.nthreads())
+            identity = self._client.scheduler.identity
+            workers = self._client.sync(identity, callback_timeout=SILENCE)["workers"]
         except Exception as problem:
             raise SweepError(
                 f"{self._scheduler}: the scheduler was lost; what was finished is kept: run again "
                 "to go on"
             ) from problem
-        for place in self._threads:
-            seen = float(workers.get(place, {}).get("last_seen", 0.0))
-            if place not in self._heard or self._heard[place][0] != seen:
-                self._heard[place] = (seen, now)
-        if set(self._threads) - set(self._refused):
-            self._alone_since, self._told = now, False
+        self._threads = {place: worker["nthreads"] for place, worker in workers.items()}
+        for place, worker in workers.items():
+            if place not in self._heard or self._heard[place][0] != worker["last_seen"]:
+                self._heard[place] = (worker["last_seen"], now)
+        if usable := set(self._threads) - set(self._refused):
+            silent = all(map(self._hangs, usable))
+            if silent and not self._told:
+                self._say(f"{self._scheduler}: waits for workers; none answers")
+            self._alone_since, self._told = now, silent
             return
         refusals = "; ".join(f"{place}: {why}" for place, why in self._refused.items())
         if now - self._alone_since > NO_WORKER[1] or (refusals and not self._batches):
@@ -226,16 +230,19 @@ class _Cluster:
         return batch
 
     def _submit(self, batch: _Batch, place: str) -> None:
+        from distributed.protocol.pickle import dumps
+
         jobs = [(number, self._jobs[number]) for number in batch.numbers]
+        call = dumps(_Call(do_batch, self._call, jobs, code_version()))
         future = self._client.submit(
-            do_batch, self._call, jobs, code_version(), pure=False, workers=[place],
-            allow_other_workers=False, key=f"{self._name}-{uuid.uuid4()}",
+            pickle.loads, call, pure=False, workers=[place], allow_other_workers=False,
+            key=f"{self._name}-{uuid.uuid4()}",
         )  # fmt: skip
         batch.places[place] = future
         future.add_done_callback(lambda ended: self._ended.put((batch, place, ended)))
 
     def _results(self, batch: _Batch, place: str, future: Any) -> Iterator[FinishedJob[Any]]:
-        if batch not in self._batches or batch.places.get(place) is not future:
+        if batch not in self._batches or id(future) != id(batch.places.get(place)):
             return
         try:
             seconds, finished = future.result(timeout=SCHEDULER_TIMEOUT)
@@ -253,8 +260,17 @@ class _Cluster:
         self._batches.remove(batch)
         self._seconds += seconds
         self._done += len(finished)
-        for one in finished:
-            yield FinishedJob(one.number, one.result, one.problem, place)
+        yield from (replace(job, place=place) for job in finished)
+
+
+class _Call:
+    """A call that is made where its pickle is read: schedulers only hand its bytes on."""
+
+    def __init__(self, function: Callable[..., Any], *arguments: Any) -> None:
+        self._call = function, arguments
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        return self._call
 
 
 def do_batch(
@@ -286,7 +302,9 @@ def _connected(scheduler: str) -> Iterator[Any]:
             f"workers: found {scheduler}, and Dask is not installed; pip install "
             "'cdpr_drake[cluster]'"
         ) from problem
-    loggers = [logging.getLogger(name) for name in ("distributed", "asyncio", "tornado")]
+    libraries = ("distributed", "asyncio", "tornado")  # loggers below them have levels, too
+    names = [name for name in logging.root.manager.loggerDict if name.startswith(libraries)]
+    loggers = [logging.getLogger(name) for name in names]
     levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL + 1)

@@ -19,7 +19,9 @@ from typing import Any, Self
 
 from filelock import FileLock, Timeout
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
 
 MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
@@ -27,10 +29,6 @@ MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
 
 LONGEST_VALUE = 60
 """Longer JSON values are not quoted in refusals [characters]."""
-
-
-class NothingToDraw(Exception):
-    """There are no data yet for a figure; it is left out, and that is no failure."""
 
 
 class Folder:
@@ -56,10 +54,11 @@ class Folder:
             OutputFolderError: The path is a file, a mount point, or the working folder or above it.
         """
         self.path, self.resumed = Path(path).absolute(), False
-        self._arguments: Any = json.loads(json.dumps(arguments))
+        self._arguments: Any = load_json(json.dumps(arguments))
         self._overwrite, self._grows = overwrite, grows
         self._files: list[str] = []
-        self._made = self._open_now = False
+        self._made: list[Path] = []
+        self._open_now = False
         self._lock = FileLock(self.path / LOCK)
         working, real = Path.cwd(), self.path.resolve()
         if real == working or real in working.parents or os.path.ismount(real):
@@ -78,7 +77,7 @@ class Folder:
                 process writes it.
         """
         with self.writing():
-            self._made = not self.path.exists()
+            self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
             self.path.mkdir(parents=True, exist_ok=True)
             try:
                 self._lock.acquire(timeout=0)
@@ -92,7 +91,7 @@ class Folder:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Unlocks the folder, and removes it if nothing was written."""
+        """Unlocks the folder, and removes it and what was made above it if nothing was written."""
         self._release()
 
     def _open(self) -> None:
@@ -111,7 +110,7 @@ class Folder:
                 words = "; ".join(different[:3]) or "these are complete"
                 raise OutputFolderError(
                     f"{self.path}: holds other results: {words}; name another folder or allow "
-                    "overwriting"
+                    "overwrite"
                 )
             self._files = marker["files"]
         for path in list(self.path.iterdir()):
@@ -128,8 +127,8 @@ class Folder:
                 (self.path / MARKER).unlink()
             if [path.name for path in self.path.iterdir()] == [LOCK]:
                 (self.path / LOCK).unlink()
-            if self._made:
-                self.path.rmdir()  # which fails unless it is empty
+            for path in self._made:
+                path.rmdir()  # which fails unless it is empty
         self._lock.release()
 
     def claim(self, name: str) -> Path:
@@ -226,7 +225,7 @@ class Folder:
 def read_marker(folder: Path) -> dict[str, Any] | None:
     """The marker of a results folder; None without one, or if it cannot be read."""
     try:
-        marker = json.loads((folder / MARKER).read_text(encoding="utf-8"))
+        marker = load_json((folder / MARKER).read_text(encoding="utf-8"))
         names = {"complete": bool(marker["complete"]), "files": list(marker["files"])}
         return {"arguments": marker["arguments"], **names}
     except (OSError, ValueError, KeyError, TypeError):
@@ -251,7 +250,7 @@ def foreign_files(folder: Path) -> list[str]:
 
 def free_folder(base: Path, arguments: Mapping[str, Any]) -> Path:
     """The first of base, base-2, ... that is free, or where these arguments go on."""
-    wanted = json.loads(json.dumps(arguments))
+    wanted = load_json(json.dumps(arguments))
     for number in count(1):
         path = base if number == 1 else base.with_name(f"{base.name}-{number}")
         marker = read_marker(path)

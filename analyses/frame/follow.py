@@ -65,8 +65,11 @@ class Count:
     began: float = field(default_factory=time.perf_counter, init=False)
 
     def __post_init__(self) -> None:
-        """Tells the start."""
+        """Tells the start, and what an earlier command has left."""
         self.done = self.found
+        if self.found:
+            words = f"{self.found:.0f} of {self.total:.0f} {self.unit} were there already"
+            self.follow.say(words)
         self.add(0.0, "starting")
 
     def add(self, more: float, what: str) -> None:

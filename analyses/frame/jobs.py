@@ -96,6 +96,8 @@ def finished_jobs(
     Raises:
         SweepError: The number of workers is not accepted, or the cluster cannot be used.
     """
+    if not jobs:
+        return
     if isinstance(workers, str):
         from cdpr_drake.analyses.frame.cluster import cluster_jobs
 
@@ -132,6 +134,8 @@ def do_job(work: Callable[[Job], Result], job: Job, number: int) -> FinishedJob[
         return FinishedJob(number, work(job))
     except Exception as problem:
         return FinishedJob(number, problem=problem)
+    except SystemExit as end:  # else a worker of a cluster ends, and others do the job again
+        return FinishedJob(number, problem=SweepError(f"SystemExit: {end}"))
 
 
 def portable(finished: FinishedJob[Result]) -> FinishedJob[Result]:
@@ -159,8 +163,9 @@ def _in_processes(
                 busy[process.connection] = process
             if not busy:
                 return
-            for connection in wait(list(busy), POLL):
-                process = busy.pop(connection)  # type: ignore[arg-type]
+            ready = wait(list(busy), POLL)
+            for connection in [connection for connection in busy if connection in ready]:
+                process = busy.pop(connection)
                 finished = process.finished()
                 if isinstance(finished.problem, ProcessDied) or process.jobs >= JOBS_PER_PROCESS:
                     process.end()

@@ -20,9 +20,9 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.session import Session, asked_workers, kept_folder
-from cdpr_drake.analyses.front.verb import verb
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.progress import WorkSession
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
@@ -102,7 +102,7 @@ def optimize_design(
         with told.computing():
             search = search_design(
                 given, candidates, asked,
-                StudySession(where, told.progress, told.stop, count, None, scheduler),
+                WorkSession(where, told.progress, told.stop, count, scheduler),
             )  # fmt: skip
         confirmed, file = [], None
         if search.best is not None and not search.interrupted:

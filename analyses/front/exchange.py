@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.models.robot_exchange import ImportedRobot
 from cdpr_drake.models.robot_exchange import import_robot as read_robot
 from cdpr_drake.summaries import as_kind

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded, unused
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
 from cdpr_drake.analyses.logs.log_replay import replay_log as compare_log

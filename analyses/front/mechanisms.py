@@ -13,7 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JointIndex
 from pydrake.systems.framework import Context
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.statics.tension_query import solve_all
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CABLE_MODELS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.planning.timed_plan_results import TimedRun
 from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.analyses.workspaces.timed_sets import find_timed_sets

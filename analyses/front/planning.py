@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.planning.free_motion import FreeSettings, solve_free_motion
 from cdpr_drake.analyses.planning.free_plan_results import FreeRun
 from cdpr_drake.analyses.planning.path_files import read_path

@@ -28,7 +28,7 @@ from cdpr_drake.analyses.front.planning import (
     silent,
     tracked_by,
 )
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.analyses.workspaces.proven_sets import (

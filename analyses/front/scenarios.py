@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, overload
 
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.systems.diagrams.load import load_scenario as load_any_scenario
 from cdpr_drake.systems.scenarios.mechanism_scenario import MechanismScenario
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario

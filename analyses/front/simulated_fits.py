@@ -27,9 +27,9 @@ from cdpr_drake.analyses.front.calibration import proposed_poses
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.planning import path_poses
 from cdpr_drake.analyses.front.session import Say, Session
-from cdpr_drake.analyses.front.verb import verb
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
-from cdpr_drake.analyses.reporting.statements import new_table
+from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot

@@ -7,12 +7,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdpr_drake.analyses.frame.folder import NothingToDraw as NothingToDraw
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.written_files import DRAWING, claim, whole_file
 
 Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
+
+
+class NothingToDraw(Exception):
+    """There are no data yet for a figure; it is left out, and that is no failure."""
 
 
 def write_pictures(

@@ -1,4 +1,4 @@
-"""Where long work stands, and how a study is run."""
+"""Where long work stands, and how it is done."""
 
 from __future__ import annotations
 
@@ -41,35 +41,24 @@ class WorkProgress:
 
 
 @dataclass(frozen=True)
-class StudySession:
-    """How a study is run; its numbers do not depend on it, but for `seeds`.
+class WorkSession:
+    """How long work is done; its numbers do not depend on it.
 
     Attributes:
-        folder: Where what is finished is kept while it runs, and found again; None: nowhere.
+        folder: Where what is finished is kept while it goes on, and found again; None: nowhere.
         on_progress: Called at the start and after every piece of work.
-        should_stop: Asked often; True ends the study, and what was finished is kept.
+        should_stop: Asked often; True ends the work, and what was finished is kept.
         workers: Number of local processes, with one this process does it; None: one for each
             processor.
-        seeds: How often what depends on chance is repeated, by studies that say so in the
-            catalogue; None: as often as the study does by itself. Its numbers depend on this.
         scheduler: Address of a Dask scheduler, whose workers compute instead.
-        earlier: Folder of the same study whose runs are taken over, where their cases are the same,
-            though other code computed them; None: none.
     """
 
     folder: Path | None = None
     on_progress: Callable[[WorkProgress], None] | None = None
     should_stop: Callable[[], bool] | None = None
     workers: int | None = None
-    seeds: int | None = None
     scheduler: str | None = None
-    earlier: Path | None = None
-
-    def tell(self, progress: WorkProgress) -> None:
-        """Passes on where the study stands."""
-        if self.on_progress is not None:
-            self.on_progress(progress)
 
 
-DEFAULT_STUDY_SESSION = StudySession()
+NOBODY_FOLLOWS = WorkSession()
 """Nobody looks, and nothing is kept."""

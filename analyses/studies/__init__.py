@@ -1,5 +1,5 @@
-"""Studies that repeat what was published, one package or module each; they do not know each other.
+"""Studies of what was published and of what we ask of ourselves, judged by facts that are data.
 
-`studies.catalogue` is their table. `studies.published` is what was published, as data, and
-`studies.framework` what case studies and studies over seeds share.
+`study` is their frame and table, `servo` what runs of a visual servo share, `facts` and
+`facts/*.yaml` what sources print, `report` the page of all.
 """

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.framework.experiments import DRAWN
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.experiments import DRAWN
+from cdpr_drake.analyses.studies.servo import PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     Panel,
     components,

@@ -6,14 +6,18 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.studies.acrobot_cases import OF, experiment_figures
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
-from cdpr_drake.analyses.studies.framework.experiments import (
+from cdpr_drake.analyses.studies.experiments import (
     as_transform,
     between,
     pose_item,
     turned,
 )
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.servo import (
+    CAROCA_ASSUMPTION,
+    CAROCA_RUN,
+    Configuration,
+    servo_study,
+)
 from cdpr_drake.analyses.studies.servo_figures import paths_layout
 
 LIFT = 0.133

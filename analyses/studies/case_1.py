@@ -15,15 +15,19 @@ from cdpr_drake.analyses.studies.caroca_cases import (
     lowered,
 )
 from cdpr_drake.analyses.studies.case_1_figures import FIGURES
-from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION, CAROCA_RUN
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.framework.experiments import (
+from cdpr_drake.analyses.studies.experiments import (
     as_transform,
     pose_item,
     wrong_points,
 )
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.facts import MissingRuns
+from cdpr_drake.analyses.studies.servo import (
+    CAROCA_ASSUMPTION,
+    CAROCA_RUN,
+    PULLEYS,
+    Configuration,
+    servo_study,
+)
 from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import repeatability

@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.caroca_cables import CAROCA_ASSUMPTION
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.servo import CAROCA_ASSUMPTION, PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     DEG,
     Panel,

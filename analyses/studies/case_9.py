@@ -12,8 +12,8 @@ from scipy.optimize import lsq_linear
 from scipy.signal import find_peaks
 
 from cdpr_drake.analyses.studies.case_9_figures import FIGURES
+from cdpr_drake.analyses.studies.experiments import wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.servo import Configuration, projected, servo_study
 from cdpr_drake.analyses.studies.slack import (
     OFF,

@@ -20,12 +20,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.closed_loops_figures import error_figure, path_figure
-from cdpr_drake.analyses.studies.framework.servo_cases import ServoCase, servo_case
-from cdpr_drake.analyses.studies.framework.servo_models import (
+from cdpr_drake.analyses.studies.perturbed_servo import (
     Perturbation,
     PerturbedServo,
+    ServoCase,
     perturbed_scenario,
     perturbed_servo,
+    servo_case,
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.analyses.workspaces.static_feasible import static_case

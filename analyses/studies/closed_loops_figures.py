@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.frame.folder import NothingToDraw
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look

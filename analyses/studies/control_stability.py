@@ -29,8 +29,7 @@ from cdpr_drake.analyses.studies.control_stability_figures import (
     printed_rows,
     reasons,
 )
-from cdpr_drake.analyses.studies.published.recipe_choices import CHOICES, chosen_on
-from cdpr_drake.analyses.studies.published.recipe_variants import (
+from cdpr_drake.analyses.studies.recipe_variants import (
     EXCHANGED_CABLES,
     FULLY_CONSTRAINED,
     IN_USE,
@@ -41,7 +40,9 @@ from cdpr_drake.analyses.studies.published.recipe_variants import (
     arranged_anchors,
     exchanged_anchors,
 )
-from cdpr_drake.analyses.studies.published.stability_recipe import (
+from cdpr_drake.analyses.studies.stability_recipe import (
+    CHOICES,
+    FITTED_TABLES,
     RECIPE,
     recipe_bounds,
     recipe_case,
@@ -49,7 +50,7 @@ from cdpr_drake.analyses.studies.published.stability_recipe import (
     recipe_options,
     single_bounds,
 )
-from cdpr_drake.analyses.studies.published.stability_tables import (
+from cdpr_drake.analyses.studies.stability_tables import (
     BASELINE_VALUES,
     BY_NAME,
     TABLES,
@@ -142,7 +143,7 @@ def recipe_cases(recipes: Iterable[Recipe], form: Form) -> Iterator[Case]:
         for bound, shares in table.rows.items():
             for value in shares:
                 about = {
-                    "recipe": recipe.name, "fitted": chosen_on(table.name, bound, value),
+                    "recipe": recipe.name, "fitted": table.name in FITTED_TABLES,
                     "baseline": value == BASELINE_VALUES[bound],
                 }  # fmt: skip
                 yield Case(

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.folder import NothingToDraw
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.published.recipe_variants import (
+from cdpr_drake.analyses.studies.recipe_variants import (
     FULLY_CONSTRAINED,
     IN_USE,
     RECIPES,
     Recipe,
 )
-from cdpr_drake.analyses.studies.published.stability_tables import (
+from cdpr_drake.analyses.studies.stability_tables import (
     BY_NAME,
     DIGIT,
     TABLES,

@@ -18,8 +18,9 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cdpr_drake.schema.yaml_files import load_yaml
 
 Frame: TypeAlias = pd.DataFrame
 
@@ -507,7 +508,9 @@ def sources() -> tuple[Source, ...]:
     Raises:
         ValueError: An entry is not accepted, or a fact stands twice.
     """
-    found = tuple(source_of(yaml.safe_load(path.read_text())) for path in sorted(FOLDER.glob("*")))
+    found = tuple(
+        source_of(load_yaml(path.read_text(encoding="utf-8"))) for path in sorted(FOLDER.glob("*"))
+    )
     check_facts(fact for source in found for fact in source.facts())
     return found
 

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.experiments import wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.framework.experiments import (
+from cdpr_drake.analyses.studies.experiments import (
     DRAWN,
     X_PC,
     as_transform,
     camera_belief,
     pose_item,
 )
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.servo import PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     Panel,
     components,

@@ -11,10 +11,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from cdpr_drake.analyses.studies.case_9 import ON, SLACK_CABLES
+from cdpr_drake.analyses.studies.experiments import SETS, SETUP, TRACKING, wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TRACKING, wrong_points
-from cdpr_drake.analyses.studies.servo import Configuration, projected, servo_study
+from cdpr_drake.analyses.studies.servo import PULLEYS, Configuration, projected, servo_study
 from cdpr_drake.analyses.studies.slack import (
     SLACKS_CM,
     THRESHOLD,

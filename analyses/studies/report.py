@@ -10,22 +10,25 @@ import io
 import json
 import shutil
 import subprocess
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import pandas as pd
 
 from cdpr_drake.analyses.frame.folder import Folder
-from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.studies.facts import GOOD, Entry, Fact, sources
 from cdpr_drake.analyses.studies.study import RESULTS, STUDIES, run_study
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.summaries import Summarized
 
 PAGE, VERDICTS_FILE = "report.html", "facts.json"
 
@@ -48,8 +51,8 @@ COLORS = 64
 """Colours of a picture in the page: one with more looks the same, and takes thrice the room."""
 
 
-@dataclass(frozen=True, eq=False)
-class Reproduction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reproduction(Summarized):
     """All studies, and what sources say beside it.
 
     Attributes:
@@ -77,17 +80,34 @@ class Reproduction:
         """Rows of facts, each once."""
         return [row for chapter in self.chapters for row in chapter["rows"] if row["key"]]
 
+    def counts(self) -> pd.DataFrame:
+        """How many facts have which verdict: a row for each source and section, a column each."""
+        facts = pd.DataFrame(self.facts(), columns=["source", "section", "verdict"])
+        places = [facts["source"], facts["section"]]
+        table = pd.get_dummies(facts["verdict"], dtype=int).groupby(places, sort=False).sum()
+        return table[[verdict for verdict in VERDICTS if verdict in table]]
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: verdicts of each source, and what did not run."""
+        return f"Reproduction by {len(self.results)} studies", [
+            *((title, _in_words(count)) for title, count in by_source(self.counts()).iterrows()),
+            ("failed", ", ".join(self.failed) or "none"),
+            ("left", ", ".join(self.left) or "none"),
+            ("report", str(self.page)),
+        ]
+
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON."""
         return {
             "quick": self.quick, "code": code_version(), "versions": package_versions(),
             "facts": self.facts(),
-            "verdicts": {title: dict(count) for title, count in counts_by_source(self.chapters)},
+            "verdicts": by_source(self.counts()).to_dict("index"),
             "studies": {name: result is not None for name, result in self.results.items()},
             "failed": dict(self.failed), "left": list(self.left),
         }  # fmt: skip
 
 
+@verb()
 def reproduce(
     folder: Path | str, quick: bool = False, only: Sequence[str] | None = None, *,
     workers: int | str | None = None, overwrite: bool = False,
@@ -114,6 +134,8 @@ def reproduce(
         CdprError: A study is unknown, or the folder is not accepted.
     """
     names = list(STUDIES) if only is None else list(only)
+    if not names:
+        raise CdprError("only: found none; accepted: names of studies")
     for name in names:
         if name not in STUDIES:
             raise CdprError(f"only: study {name!r} is unknown; {closest(name, STUDIES)}")
@@ -126,7 +148,7 @@ def reproduce(
                 left.append(name)
                 continue
             words = f"{number + 1}/{len(names)} {name}"
-            told = replace(follow, progress=_named(follow, words))
+            told = _named(follow, words)
             earlier = None if runs_from is None else Path(runs_from) / name
             try:
                 found = run_study(
@@ -134,9 +156,10 @@ def reproduce(
                     formats=tuple(dict.fromkeys([*DEFAULT_FORMATS, *formats])),
                     runs_from=earlier if earlier and earlier.is_dir() else None, follow=told,
                 )  # fmt: skip
-            except CdprError as problem:
-                failed[name] = str(problem)
-                follow.say(f"{name}: {problem}")
+            except Exception as problem:  # whatever a study stumbles over
+                kind = "" if isinstance(problem, CdprError) else f"{type(problem).__name__}: "
+                failed[name] = f"{kind}{problem}"
+                follow.say(f"{name}: {failed[name]}")
                 continue
             if found.interrupted:
                 left.append(name)
@@ -148,8 +171,13 @@ def reproduce(
     return report
 
 
-def _named(follow: Follow, words: str) -> Any:
-    return lambda progress: follow.progress(replace(progress, what=f"{words}: {progress.what}"))
+def _named(follow: Follow, words: str) -> Follow:
+    """Who follows, told with words before each line."""
+
+    def progress(now: Progress) -> None:
+        follow.progress(replace(now, what=f"{words}: {now.what}"))
+
+    return replace(follow, progress=progress, say=lambda line: follow.say(f"{words}: {line}"))
 
 
 def reproduction_of(
@@ -163,6 +191,7 @@ def reproduction_of(
         for section, entries in source.sections.items():
             rows = [_row(folder, entry, results) for entry in entries if entry.studies() & {*names}]
             for row in rows:
+                row |= {"source": source.title, "section": section}
                 row["was"] = older.get(row["key"], row["verdict"])
             if rows:
                 chapters.append({"source": source.title, "section": section, "rows": rows})
@@ -202,14 +231,23 @@ def page_of(report: Reproduction) -> str:
         report=report,
         facts=facts,
         verdicts=VERDICTS,
-        by_source=_count_table(counts_by_source(report.chapters)),
-        by_chapter=_by_chapter(report.chapters),
+        counts=report.counts(),
+        by_source=by_source(report.counts()),
         failed=_by_cause(facts),
         changed=[row for row in facts if row["was"] != row["verdict"]],
         versions={**package_versions(), "code": code_version()},
         picture=_picture,
         tables=tables,
     )
+
+
+def by_source(counts: pd.DataFrame) -> pd.DataFrame:
+    """Counts of all sections of each source."""
+    return counts.groupby(level="source", sort=False).sum()
+
+
+def _in_words(counts: pd.Series) -> str:
+    return ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
 
 
 def _by_cause(facts: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[Mapping[str, Any]]]]:
@@ -220,33 +258,6 @@ def _by_cause(facts: Sequence[Mapping[str, Any]]) -> list[tuple[str, list[Mappin
         for kind, words in CAUSES.items()
     ]
     return [(words, rows) for words, rows in groups if rows]
-
-
-def _count_table(rows: Sequence[tuple[str, Counter[str]]]) -> dict[str, Any]:
-    """Counts with the verdicts that occur, in their order."""
-    return {"verdicts": [v for v in VERDICTS if any(count[v] for _, count in rows)], "rows": rows}
-
-
-def counts_by_source(chapters: Iterable[Mapping[str, Any]]) -> list[tuple[str, Counter[str]]]:
-    """How many facts of each source have which verdict."""
-    sums: dict[str, Counter[str]] = {}
-    for chapter in chapters:
-        sums.setdefault(chapter["source"], Counter()).update(_counted([chapter]))
-    return list(sums.items())
-
-
-def _counted(chapters: Iterable[Mapping[str, Any]]) -> Counter[str]:
-    return Counter(row["verdict"] for c in chapters for row in c["rows"] if row["key"])
-
-
-def _by_chapter(chapters: Sequence[Mapping[str, Any]]) -> list[tuple[str, dict[str, Any]]]:
-    """For each source its title and the counts of its sections that have facts."""
-    titles = dict.fromkeys(chapter["source"] for chapter in chapters)
-    tables = []
-    for title in titles:
-        rows = [(c["section"], _counted([c])) for c in chapters if c["source"] == title]
-        tables.append((title, _count_table([row for row in rows if row[1]])))
-    return tables
 
 
 def _verdicts(facts: Iterable[Mapping[str, Any]]) -> dict[str, str]:
@@ -263,7 +274,7 @@ def _older(path: Path) -> dict[str, str]:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        found: dict[str, Any] = load_json(path.read_text(encoding="utf-8"))
         return found
     except (OSError, ValueError):
         return None

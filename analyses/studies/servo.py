@@ -31,6 +31,21 @@ Curves = Mapping[str, Array]
 Numbers = Callable[[Curves], Mapping[str, Any]]
 """Gives a study's own columns of a run's curves, in SI units."""
 
+PULLEYS = "cables.pulleys=true"
+"""The simulated robot has the pulleys of the prototype; the controller knows nothing of them."""
+
+CAROCA_RUN = (PULLEYS, "duration=150")
+"""Runs of CAROCA end when the servo has converged; one that has not within the 90 s of its scenario
+has not yet failed."""
+
+CAROCA_ASSUMPTION = (
+    "CAROCA's cables are catenaries over pulleys, of the printed modulus and diameter and of the "
+    "weight of solid steel, as A.1.2 asks for; the platform's swing is damped by what its robot "
+    "file says. That damping is fitted so that a gain of 1.5 1/s converges (servoing thesis 2.3), "
+    "and 1.7 1/s is at the limit (4.4.2); nothing else is. All cases on CAROCA have these cables."
+)
+"""See docs/theory/reproduction.md, "The cables of CAROCA"."""
+
 METRICS = {
     "time_s": "s", "position_error_m": "mm", "rotation_error_rad": "deg", "image_max_px": "px",
     "image_mean_px": "px", "camera_max_m": "mm", "camera_mean_m": "mm", "estimate_max_m": "mm",
@@ -111,8 +126,10 @@ def servo_cases(
         for c in some:
             call = partial(
                 servo_run, c.scenario or scenario, (*changes, *c.changes, f"camera.kind={camera}"),
-                metrics, stability, **({"platform": c.platform} if c.platform else {}),
+                metrics, stability,
             )  # fmt: skip
+            if c.platform:
+                call = partial(call, platform=c.platform)
             most = 1 if camera == RENDERED else None
             keys = {"configuration": c.name, "group": c.group, "camera": camera}
             yield Case(
@@ -181,6 +198,10 @@ def stability_curves(result: RunResult, threshold: float) -> dict[str, Array]:
 def projected(rows: Frame) -> Frame:
     """Rows with projected images, of which facts, figures and tables are."""
     return rows[rows["camera"] == PROJECTED]
+
+
+def _of_projected(make: Callable[[Frame], Any], rows: Frame) -> Any:
+    return make(projected(rows))
 
 
 def outcome_words(outcomes: Iterable[str]) -> str:
@@ -282,12 +303,9 @@ def servo_study(
             for group in groups
             for camera, words in cameras.items()
         }
-        | {
-            title: (lambda rows, make=make: make(projected(rows)))
-            for title, make in (tables or {}).items()
-        },
+        | {title: partial(_of_projected, make) for title, make in (tables or {}).items()},
         figures={
-            name: (lambda rows, make=make: make(projected(rows), labels))
+            name: partial(_of_projected, partial(make, labels=labels))
             for name, make in drawn.items()
         },
     )

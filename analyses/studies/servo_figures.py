@@ -419,6 +419,10 @@ QUANTITIES = {
 """Figures with a panel for each cable: curve, label, factor."""
 
 
+def _of_cable(one: Shown, name: str, k: int) -> Array:
+    return np.asarray(one.curve(name)[:, k])
+
+
 def cable_layout(
     title: str, quantity: str, of: Sequence[str], rows: Frame, labels: Mapping[str, str]
 ) -> Figure:
@@ -432,9 +436,8 @@ def cable_layout(
     drawn = bare_figure((14.0, 2.6 * lines + 2.2), title)
     grid: Any = drawn.subplots(lines, 2, squeeze=False, sharex=True)
     for k, (axes, cable) in enumerate(zip(grid.flat, cables, strict=False)):
-        over_time(
-            label, lambda one, k=k: one.curve(name)[:, k], factor, linewidth=1.0, markersize=4.0
-        )(axes, shown)
+        of_cable = partial(_of_cable, name=name, k=k)
+        over_time(label, of_cable, factor, linewidth=1.0, markersize=4.0)(axes, shown)
         known = [one for one in shown if "tension_thresholds" in one]
         if quantity == "cable_tensions" and known:
             axes.axhline(
@@ -469,7 +472,7 @@ def small_multiples(
         axes.grid(alpha=0.3)
     for axes in grid.flat[len(shown) :]:
         axes.remove()
-    legend_below(drawn, grid.flat[: len(shown)])
+    legend_below(drawn, list(grid.flat)[: len(shown)])
     return drawn
 
 

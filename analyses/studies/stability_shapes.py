@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.studies.published.stability_recipe import (
+from cdpr_drake.analyses.studies.stability_recipe import (
     RECIPE,
     recipe_bounds,
     recipe_case,
     recipe_grid,
     recipe_options,
 )
-from cdpr_drake.analyses.studies.published.stability_tables import BASELINE_VALUES, BY_NAME
 from cdpr_drake.analyses.studies.stability_shapes_figures import (
     BASELINE,
     NESTED,
@@ -30,6 +29,7 @@ from cdpr_drake.analyses.studies.stability_shapes_figures import (
     planar_figure,
     solids_figure,
 )
+from cdpr_drake.analyses.studies.stability_tables import BASELINE_VALUES, BY_NAME
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -18,7 +19,7 @@ from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeAlias
+from typing import Any, TextIO, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -27,6 +28,7 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.frame.folder import Folder, differences, read_marker
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.studies.facts import (
@@ -40,7 +42,9 @@ from cdpr_drake.analyses.studies.facts import (
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import closest
+from cdpr_drake.summaries import Summarized
 
 Frame: TypeAlias = pd.DataFrame
 Row = Mapping[str, Any]
@@ -48,6 +52,9 @@ Call = partial[Any]
 
 ROWS, ARRAYS, RESULTS = "rows.jsonl", "arrays", "results.json"
 """Files of a study's folder: a line each row, arrays of rows by digest, and what came out."""
+
+MOST_SEEDS = 10_000
+"""Every row of a study is listed before the first is measured."""
 
 UNITS = {
     "m": "m", "m2": "m^2", "m3": "m^3", "rad": "rad", "deg": "deg", "px": "px", "s": "s", "n": "N",
@@ -140,6 +147,7 @@ class Study:
     recipes: Sequence[str] = ()
 
 
+@verb()
 def run_study(
     study: str | Study, folder: Path | str | None = None, quick: bool = False, *,
     seeds: int | None = None, recipe: str = "", workers: int | str | None = None,
@@ -169,10 +177,12 @@ def run_study(
     if recipe and recipe not in one.recipes:
         accepted = closest(recipe, one.recipes) if one.recipes else "accepted: none, as it has none"
         raise CdprError(f"recipe: {recipe!r} is unknown for {one.name}; {accepted}")
-    if seeds is not None and seeds < 1:
-        raise CdprError(f"seeds: found {seeds}; accepted: at least 1")
+    if seeds is not None and not 1 <= seeds <= MOST_SEEDS:
+        raise CdprError(f"seeds: found {seeds}; accepted: 1 to {MOST_SEEDS}")
     form = Form(quick, seeds, recipe)
-    arguments = {"study": one.name, "quick": quick, "recipe": recipe, "code": code_version()}
+    arguments = arguments_of(one.name, form)
+    if runs_from is not None:
+        check_earlier(Path(runs_from), arguments)
     with ExitStack() as stack:
         if folder is None:
             where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
@@ -181,19 +191,30 @@ def run_study(
         results = stack.enter_context(Folder(where, arguments, overwrite, grows=True))
         rows = stack.enter_context(RowStore(results))
         if runs_from is not None:
-            rows.take_over(Path(runs_from), arguments)
+            rows.take_over(Path(runs_from))
         plan = [
             (keys, call, digest(call), case.alone)
             for case in one.cases(form) for keys, call in case.calls()
         ]  # fmt: skip
         failed = _measure(plan, rows, workers, follow, one.name)
         records = rows.in_order(plan, in_memory=folder is None)
-        found = StudyResult(one, form, records, len(plan), rows.taken, failed)
+        lacking = {digest for _, _, digest, _ in plan if digest not in rows}
+        found = StudyResult(
+            one, form, records, len(plan), rows.taken, failed,
+            folder=None if folder is None else results.path, stopped=len(lacking) > len(failed),
+        )  # fmt: skip
         if folder is not None:
             found.undrawn.update(found.write(results, formats, follow.stop))
             if not found.interrupted and not found.undrawn:
                 results.complete()
     return found
+
+
+def arguments_of(study: str, form: Form) -> dict[str, Any]:
+    """What the rows in a folder of a study depend on, beside their calls."""
+    return {
+        "study": study, "quick": form.quick, "recipe": form.recipe, "code": code_version(),
+    }  # fmt: skip
 
 
 Plan = Sequence[tuple[Mapping[str, Any], Call, str, bool]]
@@ -277,16 +298,18 @@ class RowStore:
         """Of an open folder."""
         self.folder, self.taken = folder, 0
         self.rows = read_rows(folder.path) if folder.resumed else {}
+        self._file: TextIO | None = None
 
     def __enter__(self) -> RowStore:
-        """Opens the file of rows, without a line that a kill has cut."""
-        whole = "".join(json.dumps([name, row]) + "\n" for name, row in self.rows.items())
-        self.folder.write_text(ROWS, whole)
-        self._file = (self.folder.path / ROWS).open("a", encoding="utf-8")
+        """Drops a line that a kill has cut."""
+        if self.rows:
+            whole = (json.dumps([name, row]) + "\n" for name, row in self.rows.items())
+            self.folder.write_text(ROWS, "".join(whole))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        if self._file is not None:
+            self._file.close()
 
     def __contains__(self, name: str) -> bool:
         return name in self.rows
@@ -303,20 +326,14 @@ class RowStore:
                 np.savez_compressed(file, allow_pickle=False, **arrays)
         words = plain({key: value for key, value in row.items() if key not in arrays})
         with self.folder.writing():
+            if self._file is None:
+                self._file = self.folder.claim(ROWS).open("a", encoding="utf-8")
             self._file.write(json.dumps([name, words]) + "\n")
             self._file.flush()
         self.rows[name] = words
 
-    def take_over(self, other: Path, arguments: Mapping[str, Any]) -> None:
-        """Takes over rows that other code measured.
-
-        Raises:
-            CdprError: The folder is none of the same study in the same form.
-        """
-        marker = read_marker(other)
-        told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
-        if different := list(differences(told, dict(arguments))):
-            raise CdprError(f"runs_from: {other}: {different[0]}; accepted: a folder of this study")
+    def take_over(self, other: Path) -> None:
+        """Takes over rows that other code measured in a folder."""
         for name, row in read_rows(other).items():
             if name not in self.rows:
                 path = other / ARRAYS / f"{name}.npz"
@@ -339,11 +356,23 @@ def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
     """Rows of a folder by digest; a line that a kill has cut does not count."""
     path = folder / ROWS
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    return dict(json.loads(line) for line in lines if line.endswith("\n"))
+    return dict(load_json(line) for line in lines if line.endswith("\n"))
 
 
-@dataclass(frozen=True, eq=False)
-class StudyResult:
+def check_earlier(folder: Path, arguments: Mapping[str, Any]) -> None:
+    """Refuses a folder that has no rows of the same study in the same form.
+
+    Raises:
+        CdprError: It has none.
+    """
+    marker = read_marker(folder)
+    told = {} if marker is None else {**marker["arguments"], "code": arguments["code"]}
+    if different := list(differences(told, dict(arguments))):
+        raise CdprError(f"runs_from: {folder}: {different[0]}; accepted: a folder of this study")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StudyResult(Summarized):
     """What a study found.
 
     Attributes:
@@ -354,6 +383,8 @@ class StudyResult:
         taken: How many of them other code had measured.
         failed: Words by digest of calls that raised, or whose process died.
         undrawn: Of files that were not written, the name and why.
+        folder: The results folder; None if nothing was kept.
+        stopped: True if it was stopped before all rows were measured.
     """
 
     study: Study
@@ -363,6 +394,8 @@ class StudyResult:
     taken: int = 0
     failed: Mapping[str, str] = field(default_factory=dict)
     undrawn: dict[str, str] = field(default_factory=dict)
+    folder: Path | None = None
+    stopped: bool = False
 
     @property
     def interrupted(self) -> bool:
@@ -408,6 +441,34 @@ class StudyResult:
         if not self.records:
             return {}
         return {name: partial(draw, self.rows) for name, draw in self.study.figures.items()}
+
+    def plot(self, name: str | None = None) -> Figure:
+        """A figure of the study.
+
+        Args:
+            name: One of `drawings`; None: the first.
+
+        Raises:
+            CdprError: There is no such figure, or none at all.
+        """
+        drawings = self.drawings()
+        if not drawings:
+            raise CdprError(f"study {self.study.name}: nothing to draw; see its tables")
+        if name is not None and name not in drawings:
+            raise CdprError(f"name: {name!r} is unknown; {closest(name, drawings)}")
+        return drawings[name or next(iter(drawings))]()
+
+    def summary(self) -> tuple[str, list[tuple[str, str]]]:
+        """What it shows of itself: verdicts, rows, tables, figures."""
+        count = Counter(fact["verdict"] for fact in self.statements)
+        verdicts = ", ".join(f"{number} {verdict}" for verdict, number in count.items())
+        return f"Study {self.study.name}" + ", interrupted" * self.interrupted, [
+            ("facts", verdicts or "none judged"),
+            ("rows", f"{len(self.records)} of {self.planned}"),
+            ("tables", ", ".join(self.tables()) or "none"),
+            ("figures", ", ".join(self.drawings()) or "none"),
+            ("folder", "none" if self.folder is None else str(self.folder)),
+        ]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON but arrays; what is not finite is null."""
@@ -503,7 +564,8 @@ STUDIES = {
     "case-7": "tracking_cases", "case-8": "tracking_cases", "case-9": "case_9",
     "case-10": "case_10", "mobile-robot": "mobile_robot",
     "control-stability": "control_stability",
-    "stability-shapes": "stability_shapes", "stability-closed-loop": "closed_loops",
+    "stability-ranges": "stability_ranges", "stability-shapes": "stability_shapes",
+    "stability-closed-loop": "closed_loops",
     "schemes": "schemes", "fusion": "fusion",
     "seen-slack": "seen_slack", "failure": "failures", "detection": "failures",
     "calibration": "calibration", "identification": "identification",
@@ -512,6 +574,11 @@ STUDIES = {
     "worked-examples": "worked_examples",
 }  # fmt: skip
 """Modules of this folder by the names of studies; each has `STUDY`, or `STUDIES` by name."""
+
+
+def studies() -> tuple[str, ...]:
+    """Names of the studies of this package, as `run_study` takes them."""
+    return tuple(STUDIES)
 
 
 def study_named(name: str) -> Study:

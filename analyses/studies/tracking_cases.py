@@ -8,9 +8,8 @@ import numpy as np
 
 from cdpr_drake.analyses.studies.caroca_cases import COMMON, HYBRID, RAISED
 from cdpr_drake.analyses.studies.caroca_cases import SERVO as CAROCA_SERVO
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
-from cdpr_drake.analyses.studies.framework.experiments import SETS, SETUP, TIME, TRACKING
-from cdpr_drake.analyses.studies.servo import Configuration, servo_study
+from cdpr_drake.analyses.studies.experiments import SETS, SETUP, TIME, TRACKING
+from cdpr_drake.analyses.studies.servo import PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     Panel,
     bars,

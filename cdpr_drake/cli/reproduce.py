@@ -2,45 +2,33 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from cdpr_drake.analyses.front.reproduction import Reproduction, StudyOfMany
-from cdpr_drake.analyses.front.reproduction import reproduce as reproduce_all
-from cdpr_drake.analyses.front.studies import chosen_studies
 from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.reporting.statements import new_table
-from cdpr_drake.analyses.reproduction.digest_pdf import NO_REPORTLAB
-from cdpr_drake.analyses.reproduction.rows import FAILED, NOT_ASKED
-from cdpr_drake.analyses.reproduction.scorecard import Scorecard
-from cdpr_drake.analyses.studies.catalogue import STUDIES
-from cdpr_drake.cli.command_session import CommandSession
+from cdpr_drake.analyses.reporting.tables import frame_table
+from cdpr_drake.analyses.studies.report import Reproduction, print_pdf
+from cdpr_drake.analyses.studies.report import reproduce as reproduce_all
+from cdpr_drake.analyses.studies.study import STUDIES
 from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.following import following
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
     ResultsAsJson,
     RunsFrom,
+    Scheduler,
+    named_options,
     parse_formats,
 )
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
+from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED
-from cdpr_drake.cli.terminal import print_json, wide_console, working
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 
-STOPPING = (
-    "Stopping: waits for what the study has begun, then writes the report; Ctrl-C again ends the "
-    "study now, and writes the report"
-)
-"""Answer to the first Ctrl-C."""
-
-WRITING = "The report is being written, from what is there; Ctrl-C again ends this without it"
-"""Answer to a Ctrl-C while the report is written, also where one has ended the studies."""
+OPTIONS = {"only": "--only", "runs_from": "--runs-from", "against": "--against"}
+"""Options by the arguments of `reproduce`."""
 
 
 def reproduce(
@@ -65,112 +53,51 @@ def reproduce(
     figure_format: FigureFormats = "png",
     as_json: ResultsAsJson = False,
     overwrite: Overwrite = False,
+    scheduler: Scheduler = None,
     runs_from: RunsFrom = None,
-    beside: Annotated[
+    against: Annotated[
         Path | None,
-        typer.Option(help="Folder of an older report, whose counts are shown beside the new ones."),
+        typer.Option(help="Folder of an older report: the new one says which verdicts changed."),
     ] = None,
+    pdf: Annotated[
+        bool, typer.Option(help="Print the report into a PDF, too, by a browser of this machine.")
+    ] = False,
 ) -> int:
-    """Runs every study and writes one report that compares published and computed results.
+    """Runs every study and writes one page on what sources print beside what is found.
 
-    Finished studies run again only if the code has changed. The same command continues an
-    interrupted one. A study that fails does not stop the others. Figures are PNG files, which the
-    report shows, and any other formats you ask for. If reportlab is installed, a digest of about
-    twelve pages is written as PDF.
+    All studies take hours in their full forms. Finished studies run again only if the code has
+    changed. The same command continues an interrupted one. A study that fails does not stop the
+    others.
     """
-    formats = parse_formats(figure_format)
-    asked = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
-    chosen_studies(asked)
-    folder = out if out is not None else Path("reproduction-quick" if quick else "reproduction")
-    with ReproductionSession(STOPPING, folder, "reproduce") as session:
-        found = reproduce_all(
-            folder, quick, asked, workers=workers, overwrite=overwrite, formats=formats,
-            runs_from=runs_from, beside=beside, session=session,
+    names = None if only is None else [name.strip() for name in only.split(",") if name.strip()]
+    folder = out or Path("reproduction-quick" if quick else "reproduction")
+    with named_options(OPTIONS), following("reproduce") as follow:
+        report = reproduce_all(
+            folder, quick, names, workers=workers if scheduler is None else scheduler,
+            overwrite=overwrite, formats=parse_formats(figure_format), runs_from=runs_from,
+            against=against, follow=follow,
         )  # fmt: skip
-    session.say_kept()
+    printed = print_pdf(report.page) if pdf else None
     if as_json:
-        print_json(found.as_dict())
+        print_json(report.as_dict())
     else:
-        _print(found)
-    again = shlex.join(
-        ["cdpr", "reproduce", "--out", str(folder), *(["--quick"] if quick else [])]
-        + (["--only", only] if only else [])
-        + (["--workers", str(workers)] if workers else [])
-        + (["--format", figure_format] if figure_format != "png" else [])
-        + (["--runs-from", str(runs_from)] if runs_from else [])
-        + (["--beside", str(beside)] if beside else [])
-    )
-    return _ending(session.console, found, again)
-
-
-class ReproductionSession(CommandSession):
-    """What a terminal shows of a reproduction: the study that runs, and how far it is."""
-
-    def progress(self, progress: StudyOfMany) -> None:
-        """Moves the bar."""
-        words, now = f"{progress.number + 1}/{progress.of} {progress.name}", progress.progress
-        if now is None:
-            self.show(completed=0, total=None, state=words)
-        else:
-            self.show(completed=now.done, total=now.total, state=f"{words}: {now.what}")
-
-    @contextmanager
-    def doing(self, words: str) -> Iterator[Callable[[str], None]]:
-        """Shows words; Ctrl-C has another answer here, also where one has ended the studies."""
-        with StopRequest(WRITING).listening(), working(self.console, words) as say:
-            yield say
-
-
-def _print(found: Reproduction) -> None:
-    """The scorecard, and where the report and its digest are."""
-    card = Scorecard.of(found.rows)
-    verdicts = card.shown_facts()
-    title = "What was published, repeated: facts, each counted once"
-    table = new_table(title, ("source", "chapter"), ("facts", *verdicts))
-    for (source, chapter), counts in card.facts.items():
-        if set(+counts) == {NOT_ASKED}:
-            continue  # the sum has them
-        cells = [str(counts[verdict] or "") for verdict in verdicts]
-        table.add_row(source.replace("_", " "), chapter, str(counts.total()), *cells)
-    table.add_section()
-    total = card.total_facts()
-    cells = [str(total[verdict]) for verdict in verdicts]
-    table.add_row("all sources", "", str(total.total()), *cells)
-    printer = wide_console(160)
-    printer.print(table)
-    printer.print(
-        f"{card.independent} facts of the sources are confirmed by runs that could have said "
-        f"otherwise; the report has {card.total().total()} figures, tables, numbers and sentences"
-    )
-    digest = "" if found.digest is None else f", digest: {shown_path(found.digest)}"
-    printer.print(f"{len(found.states)} studies, report: {shown_path(found.page)}{digest}")
-
-
-def _ending(console: Console, found: Reproduction, again: str) -> int:
-    """Says what is left to do; returns the exit code."""
-    states, left = found.states, found.left
-    failed = [state for state in states.values() if state.status == "failed"]
-    for state in failed:
-        console.print(f"cdpr: {FAILED}: {state.study}: {state.error}")
-    pictures = [state for state in states.values() if state.lacks_pictures]
-    for state in pictures:
-        console.print(
-            f"cdpr: {state.study}: the data is complete; not written: {state.error}; the same "
-            "command tries again",
-            soft_wrap=True, markup=False, highlight=False,
-        )  # fmt: skip
-    for name, why in found.failed.items():
-        older = " (the one that is there is of an earlier report)"
-        there = (found.page.parent / name).exists()
-        console.print(
-            f"cdpr: {name} was not written{older if there else ''}: {why}",
-            soft_wrap=True, markup=False, highlight=False,
-        )  # fmt: skip
-    if left:
-        console.print(f"Interrupted; left: {', '.join(left)}; to continue:\n{again}")
+        _print(report)
+    console = message_console()
+    for name, words in report.failed.items():
+        console.print(f"cdpr: study failed: {name}: {words}")
+    if pdf and printed is None:
+        console.print("cdpr: --pdf: no browser here prints; open the page in one and print it")
+    if report.left:
+        console.print(f"Interrupted; left: {', '.join(report.left)}; the same command goes on")
         return INTERRUPTED
-    if failed:
+    if report.failed:
         return STUDY_FAILED
-    # A library that nobody installed is a choice, and trying again changes nothing.
-    incomplete = pictures or any(why != NO_REPORTLAB for why in found.failed.values())
-    return INCOMPLETE if incomplete else 0
+    return INCOMPLETE if pdf and printed is None else 0
+
+
+def _print(report: Reproduction) -> None:
+    """Verdicts of each section, and where the report is."""
+    table = report.counts().reset_index()
+    printer = wide_console(160)
+    printer.print(frame_table("What sources print, beside what is found", table))
+    printer.print(f"report: {shown_path(report.page)}")

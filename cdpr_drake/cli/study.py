@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cdpr_drake.analyses.front.studies import chosen_studies, run_study
-from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.studies.catalogue import STUDIES
-from cdpr_drake.analyses.studies.published.recipe_variants import RECIPES
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.cli.command_session import CommandSession, shown
+from cdpr_drake.analyses.frame.folder import free_folder
+from cdpr_drake.analyses.reporting.tables import frame_table
+from cdpr_drake.analyses.studies.study import (
+    MOST_SEEDS,
+    STUDIES,
+    Form,
+    arguments_of,
+    run_study,
+    study_named,
+)
 from cdpr_drake.cli.completion import words_among
+from cdpr_drake.cli.following import following
 from cdpr_drake.cli.options import (
     FigureFormats,
     Overwrite,
@@ -26,20 +29,8 @@ from cdpr_drake.cli.options import (
     parse_formats,
 )
 from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import report_failures
-from cdpr_drake.cli.terminal import print_json, wide_console
-
-NAMES = sorted(RECIPES)
-"""Of the recipes of control-stability."""
-
-STOPPING = (
-    "Stopping: waits for what has been begun, then writes what is finished; Ctrl-C again ends this "
-    "now"
-)
-"""Answer to the first Ctrl-C."""
-
-MOST_SEEDS = 10_000
-"""Runs of each configuration at the most: every one of them is listed before the first begins."""
+from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED
+from cdpr_drake.cli.terminal import message_console, print_json, wide_console
 
 OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "runs_from": "--runs-from"}
 """Options by the arguments of `run_study`."""
@@ -51,8 +42,8 @@ PIPE_WIDTH = 160
 def help_words() -> str:
     """What `cdpr study --help` says above the options."""
     return (
-        "Runs a study and writes results.json and figures; Ctrl-C keeps what is finished.\n\n"
-        "Run again with the same --out, it continues where it was stopped or killed."
+        "Runs a study and writes results.json, tables and figures; Ctrl-C keeps what is finished."
+        "\n\nRun again with the same --out, it continues where it was stopped or killed."
     )
 
 
@@ -64,14 +55,12 @@ def study(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Results folder; default: a new one below studies/.")
+        Path | None, typer.Option(help="Results folder; default: one below studies/.")
     ] = None,
     quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
     seeds: Annotated[
         int | None,
-        typer.Option(
-            help="Runs of each configuration, where a study repeats them.", min=1, max=MOST_SEEDS
-        ),
+        typer.Option(help="How often what depends on chance is measured.", min=1, max=MOST_SEEDS),
     ] = None,
     workers: Annotated[
         int | None,
@@ -83,53 +72,35 @@ def study(
     scheduler: Scheduler = None,
     runs_from: RunsFrom = None,
     recipe: Annotated[
-        str | None,
-        typer.Option(
-            help=f"Another recipe alone, on all rows, for control-stability: {', '.join(NAMES)}.",
-            autocompletion=words_among(NAMES),
-        ),
-    ] = None,
+        str, typer.Option(help="Another recipe for the same rows, for studies that have some.")
+    ] = "",
 ) -> int:
     """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
-    chosen_studies([name])
-    formats = parse_formats(figure_format)
-    called = name if recipe is None else f"{name}-{recipe}"
-    folder = out if out is not None else free_folder(Path("studies") / called)
-    with (
-        named_options(OPTIONS),
-        CommandSession(STOPPING, folder, name) as session,
-    ):
-        found = run_study(
-            name, folder, quick, seeds=seeds, recipe=recipe, workers=scheduler or workers,
-            overwrite=overwrite, formats=formats, runs_from=runs_from, session=session,
+    study_named(name)
+    formats, form = parse_formats(figure_format), Form(quick, seeds, recipe)
+    usual = Path("studies") / "-".join(filter(None, (name, recipe)))
+    folder = out or free_folder(usual, arguments_of(name, form))
+    with named_options(OPTIONS), following(name) as follow:
+        result = run_study(
+            name, folder, quick, seeds=seeds, recipe=recipe,
+            workers=workers if scheduler is None else scheduler, overwrite=overwrite,
+            formats=formats, runs_from=runs_from, follow=follow,
         )  # fmt: skip
-    console, folder = session.console, shown(found.folder)
-    session.say_kept()
     if as_json:
-        print_json(found.as_dict())
+        print_json(result.as_dict())
     else:
         printer = wide_console(PIPE_WIDTH)
-        for table in found.tables():
-            printer.print(table)
+        for title, table in result.tables().items():
+            printer.print(frame_table(title, table))
         printer.print(f"results: {folder}")
-    if found.interrupted:
-        words = f"Interrupted; what was finished is in {folder}; to continue:\n"
-        words += _command(name, folder, quick, as_json, formats)
-        given = {
-            "--seeds": seeds, "--workers": workers, "--scheduler": scheduler,
-            "--recipe": recipe, "--runs-from": runs_from,
-        }  # fmt: skip
-        for option, value in given.items():
-            words += f" {option} {value}" if value is not None else ""
-        console.print(words)
-        report_failures(console, found.failed, folder, None)
+    console = message_console()
+    for file, why in result.undrawn.items():
+        console.print(f"cdpr: {folder / file}: not written: {why}")
+    for words in result.failed.values():
+        console.print(f"cdpr: failed: {words}")
+    if result.stopped:
+        console.print(f"Interrupted; the same command with --out {folder} goes on")
         return INTERRUPTED
-    return report_failures(console, found.failed, folder, None)
-
-
-def _command(name: str, folder: Path, quick: bool, as_json: bool, formats: Sequence[str]) -> str:
-    """The command that continues a study."""
-    options = ["--quick"] * quick + ["--json"] * as_json
-    if tuple(formats) != DEFAULT_FORMATS:
-        options += ["--format", ",".join(formats)]
-    return shlex.join(["cdpr", "study", name, "--out", str(folder), *options])
+    if result.failed:
+        return STUDY_FAILED
+    return INCOMPLETE if result.undrawn else 0

@@ -42,13 +42,6 @@ def test_a_plan_and_repeated_runs():
     assert list(runs.to_dataframe()["seed"]) == [0, 1]
 
 
-def test_without_pandas_the_message_names_what_has_the_same(workspace, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(ImportError, match=r"columns\(\) has the same"):
-        workspace.to_dataframe()
-    assert {len(column) for column in workspace.columns().values()} == {workspace.grid.size}
-
-
 def test_a_run_writes_its_replay_and_has_the_columns_of_its_log(tmp_path):
     run = cdpr.simulate("acrobot_pbvs", QUICK, tmp_path / "run", formats=())
     frame, written = run.to_dataframe(), pd.read_csv(tmp_path / "run" / "log.csv")

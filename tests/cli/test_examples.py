@@ -58,6 +58,30 @@ def logs_beside(out):
     return "acrobot_pbvs: converged" in out and "['X_WP_homing']" in out
 
 
+def converges_where_certified(out):
+    shares = numbers(r"(?:pbvs|2\.5d|ibvs) +([\d.]+) +([\d.]+) +([\d.]+) +([\d.]+) +23", out)
+    return len(shares) == 3 and np.all(shares[:, :3].argsort() == [2, 1, 0]) and np.all(shares > 0)
+
+
+def is_proven_and_hardly_longer(out):
+    straight, proven, bound, _, wrong = numbers(
+        r"wall" + 5 * r", ([\d.]+)", out
+    ).T  # fmt: skip
+    close = (straight < bound) & (bound <= proven * (1.0 + 1e-6)) & (proven < 1.1 * straight)
+    return len(proven) == 2 and np.all(close) and not np.any(wrong)
+
+
+def gains(out):
+    return "acrobot_large" in out and "caroca" in out
+
+
+def leaves_less_swing(out):
+    ends, left, off = numbers(r"([\d.]+) +([\d.]+) +([\d.]+)\n", out).T
+    plain, zvd, shot, robust = 0, 2, 4, 5
+    sooner = ends[plain] < ends[shot] < ends[zvd]
+    return sooner and left[shot] < left[zvd] < 0.1 * left[plain] and off[robust] < off[zvd]
+
+
 def is_heavier_saved_and_asked(out):
     share = numbers(r"static +([\d.]+) % of the poses", out)[0, 0]
     there = Path("mine.yaml").is_file() and Path("mine_workspace.png").stat().st_size > 0
@@ -142,13 +166,15 @@ def one_winds_and_one_waits(out):
 
 
 SAID = {
-    "calibrate": calibrates, "learning": learns, "monte_carlo": repeats,
+    "basin": converges_where_certified, "calibrate": calibrates, "design": gains,
+    "learning": learns, "monte_carlo": repeats,
     "own_controller": winds_to_the_goal, "own_estimator": logs_beside,
     "own_robot": is_heavier_saved_and_asked, "own_scheme": both_schemes_arrive,
     "own_tension_method": is_known_by_name, "plan_and_follow": is_tracked,
-    "process_outside": is_closed_for_two_seconds, "robot_with_arm": changes_with_the_arm,
-    "two_robots": one_winds_and_one_waits,
-    "adaptation": learns_points, "lenses": costs_noise_if_known, "pan_tilt": sees_more_on_joints,
+    "process_outside": is_closed_for_two_seconds, "proven_paths": is_proven_and_hardly_longer,
+    "robot_with_arm": changes_with_the_arm, "two_robots": one_winds_and_one_waits,
+    "without_swing": leaves_less_swing, "adaptation": learns_points,
+    "lenses": costs_noise_if_known, "pan_tilt": sees_more_on_joints,
     "pick_and_place": puts_the_box_down, "tagless": is_nearer_without_a_tag,
 }  # fmt: skip
 """What the text of each example says, of what it prints and writes. A new one has a row."""
@@ -169,7 +195,7 @@ def test_an_example_does_what_it_says_in_an_empty_folder(name, here, capfd, monk
     monkeypatch.setattr(
         cdpr,
         "simulate",
-        lambda what, words, *more, **named: simulate(what, [*words, *shorter], *more, **named),
+        lambda what, words=(), *more, **named: simulate(what, [*words, *shorter], *more, **named),
     )
     before = [dict(table) for table in TABLES]
     try:

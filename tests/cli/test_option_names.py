@@ -8,8 +8,8 @@ from cdpr_drake.analyses.front.simulated_fits import (
     identify_in_simulation,
 )
 from cdpr_drake.analyses.front.simulation import simulate
-from cdpr_drake.analyses.front.studies import run_study
 from cdpr_drake.analyses.simulation.live_messages import open_connection
+from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
 from cdpr_drake.errors import CdprError

@@ -269,7 +269,7 @@ REFUSED = {
     "reproduce": [
         ("--only case-88 --out r", "study 'case-88' is unknown; did you mean"),
         ("--only , --out r", "accepted"),
-        ("--out r --beside old", "summary.json: cannot be read: No such file"),
+        ("--out r --against old", "--against: old: found no facts.json"),
     ],
     "import-log": [
         ("log.csv --out log.csv --overwrite", "found log.csv, the log itself"),

@@ -63,7 +63,7 @@ def exit_code(words):
 @with_blocks("python")
 def test_python_runs(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    compare, names = cdpr.compare_reactions, {}
+    compare, names = cdpr.compare_reactions, {"__name__": "__main__"}
 
     def short(*given, **more):
         return compare(*given, **more | {"time": 0.2, "after": 0.2})

@@ -15,7 +15,6 @@ from scipy.optimize import linprog, minimize
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import make_path, path_task, robot_limits
-from cdpr_drake.analyses.studies.planning.convex_timing import convex_time, difference_asks
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -27,6 +26,7 @@ from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.planning.path_timing_program import PathTimingProgram, task_asks
 from cdpr_drake.planning.resistance import resistance_bounds, resisted, resisted_along, row_count
 from cdpr_drake.trajectories.pose_path import POINT_SIZE
+from tests.planning.convex_timing import convex_time, difference_asks
 from tests.planning.planning_cases import BETWEEN, PATHS, case, limits, planned, pose, wrench_of
 
 AGREEMENT = 0.01  # of the time, as the planner promises against a fine program

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.studies.framework.servo_models import Perturbation, perturbed_servo
+from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_servo
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds
 from cdpr_drake.analyses.workspaces.stability_question import varied
 from cdpr_drake.errors import CdprError, StabilityError

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 from nicegui import run, ui
 
-from cdpr_drake.analyses.studies.catalogue import STUDIES
+from cdpr_drake.analyses.studies.study import STUDIES
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_table

@@ -1,9 +1,21 @@
 """Rows of every group of benchmarks: each says what its ratio is; no time is asserted."""
 
+import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
+from cdpr_drake.analyses.benchmarks.planning import station_programs
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+)
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_per_call
+from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.planning.path_timing import plan_along_path
 from tests.analyses.benchmarks.once import without_repeats
 
 FASTER = ("times faster", "times as fast", "real-time factor", "in the time of one")
@@ -62,3 +74,18 @@ def test_seconds_per_call_calls():
     calls = []
     assert seconds_per_call(lambda: calls.append(1), 7) >= 0.0
     assert len(calls) == 7
+
+
+def test_the_baseline_of_planning_asks_the_same_limits():
+    """Without limits of speeds the largest (ds/dt)^2 of a station is that of HiGHS."""
+    robot = load_robot("acrobot_large")
+    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), cable_speed=1e3, reserve=RESERVE))
+    poses = [
+        pose_from_angles(np.array(p), np.zeros(3))
+        for p in ([0, 0, 0.2], [0.15, -0.1, 0.4], [-0.1, 0.1, 0.3])
+    ]
+    path = make_path(robot, poses, "smooth")
+    plan = plan_along_path(task, path, 20)
+    programs = station_programs(task, path, plan.trajectory.stations[4:-4:4])
+    highs = [linprog(**program, method="highs").x[1] for program in programs]
+    np.testing.assert_allclose(np.minimum(plan.largest[4:-4:4], 100.0), highs, rtol=1e-6)

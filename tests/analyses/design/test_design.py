@@ -3,12 +3,10 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
-from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
@@ -18,12 +16,7 @@ from cdpr_drake.analyses.design.results import DesignResult, write_design
 from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.front.design import optimize_design
-from cdpr_drake.analyses.reporting.progress import StudySession, WorkProgress
-from cdpr_drake.analyses.reporting.statements import CONFIRMED, IN_PART, NOT_CONFIRMED, NOT_TESTABLE
-from cdpr_drake.analyses.studies import design as study
-from cdpr_drake.analyses.studies.catalogue import STUDIES
-from cdpr_drake.analyses.studies.framework.runs import Run, Runs, pack_row
-from cdpr_drake.analyses.studies.framework.study import Form
+from cdpr_drake.analyses.reporting.progress import WorkSession
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import load_robot
@@ -101,17 +94,17 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, candidates
     pytest.importorskip("cmaes")
     settings = wanted("wrench-feasible")
     whole = search_design(ROBOT, candidates, settings)
-    session = StudySession(tmp_path / "one", should_stop=stopped_after(6))
+    session = WorkSession(tmp_path / "one", should_stop=stopped_after(6))
     part = search_design(ROBOT, candidates, settings, session)
     assert part.interrupted
     assert 0 < len(part.values) < len(whole.values)
-    again = search_design(ROBOT, candidates, settings, StudySession(tmp_path / "one"))
+    again = search_design(ROBOT, candidates, settings, WorkSession(tmp_path / "one"))
     assert not again.interrupted
     assert again.progress.found >= len(part.values)
     assert np.array_equal(again.values, whole.values)
     assert np.array_equal(again.coordinates, whole.coordinates)
     more = search_design(
-        ROBOT, candidates, replace(settings, generations=4), StudySession(tmp_path / "one")
+        ROBOT, candidates, replace(settings, generations=4), WorkSession(tmp_path / "one")
     )
     assert len(more.values) == len(whole.values) + 4
     assert more.progress.found == len(whole.values)
@@ -260,87 +253,6 @@ def test_a_set_of_too_few_cables_closes_nowhere():
     assert found.design == found.design_open == 0.0
 
 
-def test_the_quick_study(tmp_path, monkeypatch):
-    pytest.importorskip("cmaes")
-    few = {"counts": ((2, 2, 2), (2, 2, 2)), "generations": (1, 1)}
-    small = tuple(replace(item, **few) for item in study.ITEMS)
-    monkeypatch.setattr(study, "ITEMS", small)
-    monkeypatch.setattr(study, "QUICK_BOXES", 100)
-    result = STUDIES["design"].run(True, StudySession(tmp_path / "study"))
-    assert not result.interrupted
-    assert [one.robot for one in result.results] == ["acrobot_large", "caroca"]
-    assert [one.name for one in result.statements] == ["acrobot_large_gain", "caroca_gain"]
-    assert {one.of for one in result.statements} <= {0, 1}
-    assert len(result.runs) == 2
-    saved = Figure.savefig
-
-    def cut(figure, path, **options):
-        if "acrobot_large" in str(path):
-            raise OSError(28, "No space left on device")
-        saved(figure, path, **options)
-
-    monkeypatch.setattr(Figure, "savefig", cut)
-    failed = result.write(tmp_path / "study")
-    figures = {"progress.png", "points.png"}
-    assert set(failed) == {f"acrobot_large/{name}" for name in figures}
-    names, *rows = (tmp_path / "study" / "runs.csv").read_text().splitlines()
-    assert names.startswith("case,robot,goal,")
-    assert [row.split(",")[0] for row in rows] == [one.robot for one in small]
-    for one in small:
-        folder = tmp_path / "study" / one.robot
-        assert load_robot(str(folder / "design" / "robot.yaml"))
-        there = {path.name for path in folder.iterdir()}
-        assert {"designs.csv", "results.json"} <= there
-        assert there & figures == (set() if one.robot == "acrobot_large" else figures)
-
-
-def found(rows, results=()):
-    """The study with these rows."""
-    form, progress = Form(), WorkProgress("", 1.0, 1.0, 0.0)
-    finished = {name: pack_row(row) for name, row in rows.items()}
-    cases = tuple(study.STUDY.plan(form))
-    return study.DesignStudyResult(study.STUDY, form, cases, finished, progress, results)
-
-
-@pytest.mark.parametrize(
-    ("design", "verdict"), [(1.4, "confirmed"), (1.2, "in part"), (0.9, "not confirmed")]
-)
-def test_the_study_says_what_was_gained_for_sure(design, verdict):
-    proof = Confirmation("static", "boxes", "m^3", 1.0, design, 0.3, 0.0, True)
-    done = tuple(SimpleNamespace(interrupted=False) for _ in study.ITEMS)
-    one, other = found({"acrobot_large": proof.as_dict()}, done).statements
-    assert one.verdict_words == verdict
-    assert one.found == f"1 to {design:.4g} m^3, {100 * (design - 1):+.1f} %"
-    assert (other.verdict, other.found) == ("not judged", "runs are missing: robot caroca")
-    assert len(found({"acrobot_large": proof.as_dict()}).statements) == 1  # interrupted
-
-
-def test_the_study_writes_no_figure_before_the_data_of_all_robots(tmp_path):
-    written = []
-
-    class Noted:
-        search = SimpleNamespace(best=None)
-        interrupted, confirmed = False, ()
-
-        def __init__(self, robot):
-            self.robot = robot
-
-        def as_dict(self):
-            return {}
-
-        def write_data(self, folder):
-            written.append(f"{folder.name} data")
-
-        def write_figures(self, folder, formats):
-            assert (tmp_path / "results.json").is_file()
-            written.append(f"{folder.name} figures")
-            return {"progress.png": "full"}
-
-    failed = found({}, (Noted("a"), Noted("b"))).write(tmp_path)
-    assert written == ["a data", "b data", "a figures", "b figures"]
-    assert failed == {"a/progress.png": "full", "b/progress.png": "full"}
-
-
 def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(tmp_path):
     """The capacity margin by points and by the winch, against what evolution finds with more."""
     settings = wanted("capacity-margin", search="slopes", generations=8)
@@ -348,9 +260,9 @@ def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(
     found = make_candidates(ROBOT, settings, "test")
     whole = search_design(ROBOT, found, settings)
     assert len(whole.scores) <= 8
-    stopped = StudySession(tmp_path / "one", should_stop=stopped_after(5))
+    stopped = WorkSession(tmp_path / "one", should_stop=stopped_after(5))
     assert search_design(ROBOT, found, settings, stopped).interrupted
-    again = search_design(ROBOT, found, settings, StudySession(tmp_path / "one"))
+    again = search_design(ROBOT, found, settings, WorkSession(tmp_path / "one"))
     np.testing.assert_array_equal(again.values, whole.values)
     assert not again.interrupted
     pytest.importorskip("cmaes")
@@ -383,21 +295,8 @@ def test_slopes_of_a_design_are_those_of_differences():
         np.testing.assert_allclose(slopes[:, k], differences, atol=1e-5 * np.max(np.abs(slopes)))
 
 
-@pytest.mark.parametrize(
-    ("original", "design", "still_open", "said"),
-    [
-        (0.5, 0.6, 0.05, CONFIRMED),
-        (0.5, 0.6, 0.2, IN_PART),
-        (0.00675, 0.003375, 1.3, NOT_TESTABLE),  # two boxes beside one, the rest is open
-        (0.557, 0.539, 0.015, NOT_CONFIRMED),
-    ],
-)
-def test_open_boxes_decide_nothing(original, design, still_open, said):
-    row = {
-        "original": original, "design": design, "original_open": still_open,
-        "design_open": still_open, "gain": design / original - 1.0, "unit": "m^3",
-        "sure_whatever_is_open": design > original + still_open,
-    }  # fmt: skip
-    runs = Runs([Run("acrobot_large", None, {"robot": "acrobot_large", "goal": "x"}, row)])
-    (check,) = [one for one in study.STUDY.checks if one.name == "acrobot_large_gain"]
-    assert check.judge(runs).verdict == said
+@pytest.mark.parametrize(("design", "sure"), [(1.4, True), (1.2, False), (0.9, False)])
+def test_a_gain_is_sure_where_more_is_proven_than_the_robot_can_have(design, sure):
+    proof = Confirmation("static", "boxes", "m^3", 1.0, design, 0.3, 0.0, True).as_dict()
+    assert proof["sure_whatever_is_open"] == sure
+    assert proof["gain"] == pytest.approx(design - 1.0)

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -48,8 +50,9 @@ def fails(number):
     return number
 
 
-def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local):
+def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local, capfd):
     finished = {one.number: one for one in finished_jobs(fails, range(8), local.scheduler_address)}
+    assert capfd.readouterr().err == ""
     assert sorted(finished) == list(range(8))
     assert finished[2].words().startswith("ValueError: two (on worker tcp://")
     assert isinstance(finished[4].problem, ProcessDied)
@@ -62,16 +65,39 @@ def wait_and_name(number):
     return os.getpid()
 
 
-def test_a_worker_that_hangs_holds_nobody_up(local, monkeypatch):
-    monkeypatch.setattr(module, "SILENCE", 2.0)
+@pytest.fixture
+def workers(local):
+    """Process ids of the two workers."""
     with distributed.Client(local.scheduler_address, set_as_default=False) as client:
-        ids = list(client.run(os.getpid).values())
-    os.kill(ids[0], signal.SIGSTOP)
+        client.wait_for_workers(2)  # those that died are replaced
+        return list(client.run(os.getpid).values())
+
+
+def test_a_worker_that_hangs_holds_nobody_up(local, workers, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    os.kill(workers[0], signal.SIGSTOP)
     try:
         finished = list(finished_jobs(wait_and_name, range(40), local.scheduler_address))
     finally:
-        os.kill(ids[0], signal.SIGCONT)
+        os.kill(workers[0], signal.SIGCONT)
     assert sorted(one.number for one in finished) == list(range(40))
+
+
+def test_it_says_so_if_no_worker_answers(local, workers, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    lines = []
+
+    def say(words):
+        lines.append(words)
+        if "none answers" in words:
+            for process in workers:
+                os.kill(process, signal.SIGCONT)
+
+    for process in workers:
+        os.kill(process, signal.SIGSTOP)
+    finished = list(finished_jobs(square, range(9), local.scheduler_address, say=say))
+    assert len(finished) == 9
+    assert len(lines) == 2
 
 
 def test_jobs_see_files_as_they_were_read_here(local, tmp_path):
@@ -90,6 +116,54 @@ def test_workers_with_other_code_are_refused_by_name(local, monkeypatch):
     with pytest.raises(SweepError, match=r"no worker can do the jobs\. tcp://.*accepted: 0\.0 of"):
         list(finished_jobs(square, range(3), local.scheduler_address, say=lines.append))
     assert any("is not used: it has cdpr_drake" in line for line in lines)
+
+
+@pytest.fixture
+def scattered(tmp_path):
+    """Starts a scheduler without this package, and workers with or without it, as programs."""
+    (tmp_path / "cdpr_drake.py").write_text("raise ModuleNotFoundError('no cdpr_drake')")
+    file = tmp_path / "scheduler.json"
+    words = ("--scheduler-file", str(file), "--no-dashboard")
+    programs = []
+
+    def start(*more, has_package):
+        place = {} if has_package else {"cwd": tmp_path}  # modules of which are found first
+        command = [sys.executable, "-m", "dask", *more, *words]
+        programs.append(subprocess.Popen(command, stderr=subprocess.DEVNULL, **place))
+
+    def cluster(has_package):
+        start("scheduler", "--host", "127.0.0.1", "--port", "0", has_package=False)
+        start("worker", "--nthreads", "1", "--no-nanny", has_package=has_package)
+        while not file.exists():
+            time.sleep(0.05)
+        return str(file), programs
+
+    yield cluster
+    for program in programs:
+        program.kill()
+        program.wait()
+
+
+def test_a_scheduler_needs_no_package(scattered):
+    finished = list(finished_jobs(square, range(5), scattered(True)[0]))
+    assert sorted(one.result for one in finished) == [0, 1, 4, 9, 16]
+
+
+def test_workers_without_the_package_are_named(scattered):
+    with pytest.raises(SweepError, match=r"no worker can do the jobs.*no cdpr_drake"):
+        list(finished_jobs(square, range(5), scattered(False)[0]))
+
+
+def test_a_scheduler_that_hangs_is_lost_in_time(scattered, monkeypatch):
+    monkeypatch.setattr(module, "SILENCE", 2.0)
+    file, (scheduler, _) = scattered(True)
+    finished = finished_jobs(wait_and_name, range(1000), file)
+    next(finished)
+    scheduler.send_signal(signal.SIGSTOP)
+    began = time.monotonic()
+    with pytest.raises(SweepError, match="the scheduler was lost; what was finished is kept"):
+        list(finished)
+    assert time.monotonic() - began < 10.0
 
 
 def test_without_workers_it_says_so_and_gives_up(monkeypatch):

@@ -28,6 +28,8 @@ def at_odds(number):
             os.kill(os.getpid(), signal.SIGKILL)
         case 5:
             return lambda: 5
+        case 6:
+            raise SystemExit(3)
     return number
 
 
@@ -45,8 +47,9 @@ def test_every_job_gives_its_result(workers):
     assert sorted((one.number, one.result) for one in finished) == [(k, k * k) for k in range(9)]
 
 
-def test_nothing_to_do_starts_nothing():
-    assert list(finished_jobs(square, [], 2)) == []
+@pytest.mark.parametrize("workers", [2, "tcp://127.0.0.1:9"])
+def test_nothing_to_do_starts_nothing(workers):
+    assert list(finished_jobs(square, [], workers)) == []
 
 
 def test_a_job_that_raises_or_whose_process_dies_is_named_and_others_go_on():
@@ -56,7 +59,8 @@ def test_a_job_that_raises_or_whose_process_dies_is_named_and_others_go_on():
     assert isinstance(finished[3].problem, ProcessDied)
     assert finished[3].words() == "its process died (SIGKILL; out of memory?)"
     assert "pickle" in finished[5].words()
-    assert [finished[k].result for k in (0, 2, 4, 6, 7)] == [0, 2, 4, 6, 7]
+    assert finished[6].words() == "SystemExit: 3"
+    assert [finished[k].result for k in (0, 2, 4, 7)] == [0, 2, 4, 7]
 
 
 def test_here_a_job_that_raises_is_named_too():

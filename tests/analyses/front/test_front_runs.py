@@ -16,7 +16,6 @@ from cdpr_drake.analyses.simulation.tension_control_run import (
     run_tension_scenario,
     summarize_tension_run,
 )
-from cdpr_drake.analyses.studies.catalogue import STUDIES, StudyEntry
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
@@ -76,48 +75,17 @@ def test_runs_over_seeds():
     one_line(lambda: cdpr.simulate("planar_pbvs", asked, seeds=[3, 3]), "different")
 
 
-class ToyResult:
-    interrupted = False
-
-    def as_dict(self):
-        return {"quick": True}
-
-    def drawings(self):
-        return {"errors": Figure}
-
-    def tables(self):
-        return []
-
-    def write(self, folder, formats=()):
-        (folder / "results.json").write_text(json.dumps(self.as_dict()))
-
-
-def test_studies(monkeypatch, tmp_path):
-    asked = []
-
-    def study(quick, session):
-        asked.append((quick, session.workers))
-        return ToyResult()
-
-    monkeypatch.setitem(STUDIES, "case-8", StudyEntry(study))
-    assert cdpr.studies() == tuple(STUDIES)
-    seen = []
-    session = Session(say=seen.append)
-    found = cdpr.run_study("case-8", quick=True, workers=1, session=session)
-    assert isinstance(found.result, ToyResult)
-    assert "Study case-8" in shows_itself(found)
-    one_line(lambda: found.plot("ways"), "ways", "errors")
-    cdpr.run_study("case-8", tmp_path / "s", quick=True, session=session)
-    assert seen == ["Writing results"]
-    assert json.loads((tmp_path / "s" / "results.json").read_text()) == {"quick": True}
-    found = cdpr.reproduce(tmp_path / "r", quick=True, only=["case-8"])
-    assert found.page.is_file()
-    assert found.states["case-8"].status == "finished"
-    assert json.loads((tmp_path / "r" / "summary.json").read_text())["studies"]
-    assert "report" in shows_itself(found)
-    assert [quick for quick, _ in asked] == [True] * 3
+def test_studies(tmp_path):
+    assert "worked-examples" in cdpr.studies()
+    result = cdpr.run_study("worked-examples", tmp_path / "s", quick=True, workers=1)
+    assert "Study worked-examples" in shows_itself(result)
+    assert result.plot("trajectory").axes
+    one_line(lambda: result.plot("ways"), "ways", "trajectory")
+    assert json.loads((tmp_path / "s" / "results.json").read_text()) == as_json(result)
+    report = cdpr.reproduce(tmp_path / "r", quick=True, only=["worked-examples"], workers=1)
+    assert report.page.is_file()
+    assert "report" in shows_itself(report)
     one_line(lambda: cdpr.run_study("case-88"), "case-88")
-    one_line(lambda: cdpr.run_study("case-8", seeds=3), "seeds")
     one_line(lambda: cdpr.reproduce(tmp_path / "x", only=["case-88"]), "case-88")
 
 

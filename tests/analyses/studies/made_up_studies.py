@@ -4,12 +4,12 @@ from contextlib import suppress
 from dataclasses import replace
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.reporting.progress import StudySession
+from cdpr_drake.analyses.reporting.progress import WorkSession
 
 
 def made(study, made_up, quick=True, seeds=None):
     """A study with rows that are made up: `made_up(case, seed)`."""
-    return replace(study, measure=made_up)(quick, StudySession(workers=1, seeds=seeds))
+    return replace(study, measure=made_up)(quick, WorkSession(workers=1, seeds=seeds))
 
 
 def verdicts(found):

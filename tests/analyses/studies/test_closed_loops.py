@@ -25,7 +25,7 @@ from cdpr_drake.analyses.studies.closed_loops import (
 )
 from cdpr_drake.analyses.studies.closed_loops import SETTINGS as LOOP_SETTINGS
 from cdpr_drake.analyses.studies.facts import facts_of, judged
-from cdpr_drake.analyses.studies.framework.servo_models import (
+from cdpr_drake.analyses.studies.perturbed_servo import (
     Perturbation,
     perturbed_scenario,
     perturbed_servo,

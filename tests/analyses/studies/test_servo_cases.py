@@ -5,7 +5,7 @@ import pytest
 
 from cdpr_drake.analyses.studies.acrobot_cases import overshoot, winding
 from cdpr_drake.analyses.studies.caroca_cases import LIFT
-from cdpr_drake.analyses.studies.framework.case_definition import PULLEYS
+from cdpr_drake.analyses.studies.servo import PULLEYS
 from cdpr_drake.analyses.studies.study import STUDIES, Form, study_named
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_holding import hold_robot

@@ -18,8 +18,8 @@ from cdpr_drake.analyses.studies.case_9 import (
     undisturbed,
 )
 from cdpr_drake.analyses.studies.case_9_figures import polygon_figure, residual_figure
+from cdpr_drake.analyses.studies.experiments import wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.framework.experiments import wrong_points
 from cdpr_drake.analyses.studies.proposed_cases import DISTURBED, WAYS, polygon_is_better
 from cdpr_drake.analyses.studies.slack import CORRECTED, PLAIN, TENSIONS, slack_change
 from cdpr_drake.analyses.studies.study import Form, study_named

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 
 from cdpr_drake.analyses.studies.facts import facts_of, judged
-from cdpr_drake.analyses.studies.published.stability_tables import BY_NAME
 from cdpr_drake.analyses.studies.stability_shapes import (
     PANELS,
     SETS,
@@ -16,6 +15,7 @@ from cdpr_drake.analyses.studies.stability_shapes import (
     cases,
     shape_row,
 )
+from cdpr_drake.analyses.studies.stability_tables import BY_NAME
 from cdpr_drake.analyses.studies.study import Form
 from tests.figure_faults import figure_faults
 

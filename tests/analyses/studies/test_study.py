@@ -204,7 +204,7 @@ def test_rows_of_other_code_are_refused_or_taken_over(tmp_path, monkeypatch):
 REFUSED = {
     "study": (lambda path: run_study("tension-metods"), "did you mean tension-methods"),
     "recipe": (lambda path: run(path, recipe="other"), "recipe: 'other' is unknown for squares"),
-    "seeds": (lambda path: run(path, seeds=0), "seeds: found 0; accepted: at least 1"),
+    "seeds": (lambda path: run(path, seeds=0), "seeds: found 0; accepted: 1 to 10000"),
     "runs from": (lambda path: run(path / "r", runs_from=path), "accepted: a folder of this study"),
     "other form": (lambda path: (run(path / "r"), run(path / "r", quick=False)), "quick is true"),
 }

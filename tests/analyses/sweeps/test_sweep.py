@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.progress import StudySession
 from cdpr_drake.analyses.reporting.written_files import MARKER, mark, new_part
 from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
-from cdpr_drake.analyses.studies.framework.study import Study
 from cdpr_drake.analyses.sweeps import workers as sweep_workers
 from cdpr_drake.analyses.sweeps.folder import SweepFolder, differences
 from cdpr_drake.analyses.sweeps.sweep import run_sweep
@@ -170,10 +168,8 @@ def test_other_folders_are_refused_before_anything_is_computed_and_left_alone(tm
     def computed(*_):
         raise AssertionError("it was computed first")
 
-    study = Study(name="other", title="Other", cases=lambda _: [], parameters=computed)
     for use in (
         lambda: SweepFolder(tmp_path, ARGUMENTS),
-        lambda: study(session=StudySession(folder=tmp_path)),
         lambda: run_poses(ARGUMENTS, {"a": (computed, 1)}, 1, dict, Path, SweepOptions(tmp_path)),
     ):
         with pytest.raises(OutputFolderError, match="holds files already"):

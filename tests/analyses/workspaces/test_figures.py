@@ -13,7 +13,7 @@ from matplotlib.colors import to_rgba
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from cdpr_drake.analyses.studies.control_stability_figures import table_figure
-from cdpr_drake.analyses.studies.published.stability_tables import BY_NAME
+from cdpr_drake.analyses.studies.stability_tables import BY_NAME
 from cdpr_drake.analyses.visualization.replay import robot_picture
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,

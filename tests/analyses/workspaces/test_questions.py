@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.front.stability import stability_question
-from cdpr_drake.analyses.studies.published.stability_recipe import recipe_case
+from cdpr_drake.analyses.studies.stability_recipe import recipe_case
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.analyses.workspaces.stability_question import scenario_task
 from cdpr_drake.errors import BoundsFileError, CdprError

@@ -25,6 +25,7 @@ from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.plant_following import MotorFollower
 from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
@@ -262,6 +263,26 @@ def test_a_predictive_platform_stays_where_the_target_is_seen():
         assert log["failures"][-1, 0] == 0.0
     assert widest["blind"] > 0.3
     assert widest["seeing"] < 1.03 * slopes[0]  # linearised at the reference
+
+
+def test_foresight_stays_nearer_to_a_motion_that_the_cables_cannot_give():
+    motion = PoseTrajectory(
+        (RigidTransform([0.0, 0.0, 0.2]), RigidTransform([0.15, -0.1, 0.4])), (0.45,), 0.1
+    )
+    errors, failures = {}, {}
+    for rate, distributor in ((1000.0, TensionDistributor), (100.0, PredictiveTensions(motion, 5))):
+        settings = TensionControlSettings(
+            trajectory=motion, gains=TaskGains(stiffness=100.0, damping=20.0), limits=(1.0, 60.0),
+            rate=rate, distributor=distributor, rule=StepRule(method="runge_kutta3", max_step=1e-3),
+        )  # fmt: skip
+        control = build_tension_control(ROBOT, settings, log_rate=200.0)
+        simulator = Simulator(control.diagram, control.make_context())
+        simulator.AdvanceTo(1.05)
+        log = control.read_log(simulator.get_context())
+        apart, _ = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
+        errors[rate], failures[rate] = np.sqrt(np.mean(apart**2)), log["failures"][-1, 0]
+    assert errors[100.0] < errors[1000.0]
+    assert failures[100.0] == 0.0 < failures[1000.0]
 
 
 def test_a_scenario_runs_with_prediction():

@@ -23,7 +23,7 @@ def test_the_command_knows_it(capsys, monkeypatch, tmp_path):
     height = float(cdpr.load_robot("acrobot_large").home.transform().translation()[2])
     told = json.loads(words)
     assert (code, told["runs"]) == (
-        0, [{"case": "acrobot_large", "robot": "acrobot_large", "height_m": height}],
+        0, [{"robot": "acrobot_large", "height_m": height}],
     )  # fmt: skip
     assert told["statements"][0]["verdict"] == "confirmed"
     assert json.loads((out / "results.json").read_text()) == told
