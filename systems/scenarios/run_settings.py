@@ -28,7 +28,7 @@ ENDINGS = tuple(
 
 @dataclass(kw_only=True)
 class ExpectedEnd:
-    """How a run of the file as it stands ends; `cdpr study scenarios` holds it against this.
+    """Expected outcome of the unmodified scenario; the package's tests check it.
 
     The errors are true ones, at the end: the platform's from its desired pose; of `pick_and_place`
     the box's from its goal.

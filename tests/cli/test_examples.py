@@ -3,11 +3,13 @@
 import json
 import re
 import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import cdpr_drake as cdpr
 from cdpr_drake.cli.app import SUBCOMMANDS
 from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS, groups
 from cdpr_drake.cli.examples import EXAMPLES as FOLDER
@@ -16,6 +18,7 @@ from cdpr_drake.systems.controllers.schemes import SCHEMES
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.tensions.methods import METHODS
 from tests.cli.commands import refuse, run, told
+from tests.systems.pick_and_place.test_pick_and_place import SHORT
 
 LONG = 65
 """Lines that an example has at most, so that it is read in a minute."""
@@ -109,6 +112,52 @@ def changes_with_the_arm(out):
     return np.max(np.abs(apart)) > 1.0 and "at rest: stable" in out
 
 
+def learns_points(out):
+    rows = dict(re.findall(r"^(.*?)  +[\d.]+ +([\d.]+) +\d+$", out, re.MULTILINE))
+    path, points = rows["largest distance from the true model's path"], rows["error of the points"]
+    doubts = re.findall(r": (\d) of 1 runs doubted", out)
+    return float(path) < 0.8 and float(points) < 1.0 and doubts[1:] == ["1", "1"]
+
+
+def costs_noise_if_known(out):
+    rows = {line[:26].strip(): np.array(line[26:].split(), float) for line in out.splitlines()[1:]}
+    ratios = {name: row[:3] / rows["no lens"][:3] for name, row in rows.items()}
+    factors = {name: rows[name][3] for name in ("barrel, known", "fisheye, known")}
+    known = all(np.all(ratios[name] < 1.02 * factor) for name, factor in factors.items())
+    ignored = [ratios[name] for name in ("barrel, ignored", "fisheye, ignored")]
+    return (
+        known and np.min(ignored) > 5.0 and all(1.0 < factor < 1.2 for factor in factors.values())
+    )
+
+
+def sees_more_on_joints(out):
+    seen = numbers(
+        r"4 starts; the tag is seen from (\d) and kept in view from (\d); (\d) arrive", out
+    )
+    fixed, turned = seen[:2], seen[2:]
+    return (
+        np.all(turned == 4)
+        and np.all(fixed < 4)
+        and numbers("at most; ([\\d.]+) px", out).max() < 20
+    )
+
+
+def puts_the_box_down(out):
+    ends = numbers(r"at most ([\d.]+) mm and ([\d.]+) deg", out)
+    blind = out.rpartition("one camera")[2]
+    return (
+        len(ends) == 3
+        and np.all(ends < (2.0, 1.0))
+        and "0 of 1 boxes" in blind
+        and "the tag that it needs was not seen" in blind
+    )
+
+
+def is_nearer_without_a_tag(out):
+    rows = numbers(r"1 of 1 arrive, ([\d.]+) mm and ([\d.]+) deg off in the median", out)
+    return len(rows) == 4 and np.all(rows[1:] <= 3.0 * rows[0]) and out.count("in 0 images") == 4
+
+
 def one_winds_and_one_waits(out):
     heights = numbers(r"\[[\d.]+ +[\d.]+ +([\d.]+)\]", out)[:, 0]
     return heights[0] > heights[1] + 1e-3 and abs(heights[1] - 0.15) < 1e-4
@@ -122,14 +171,30 @@ SAID = {
     "own_tension_method": is_known_by_name, "plan_and_follow": is_tracked,
     "process_outside": is_closed_for_two_seconds, "proven_paths": is_proven_and_hardly_longer,
     "robot_with_arm": changes_with_the_arm, "two_robots": one_winds_and_one_waits,
-    "without_swing": leaves_less_swing,
+    "without_swing": leaves_less_swing, "adaptation": learns_points,
+    "lenses": costs_noise_if_known, "pan_tilt": sees_more_on_joints,
+    "pick_and_place": puts_the_box_down, "tagless": is_nearer_without_a_tag,
 }  # fmt: skip
 """What the text of each example says, of what it prints and writes. A new one has a row."""
 
 
+SHORTER = {
+    "adaptation": ["duration=5"],
+    "pick_and_place": SHORT,
+    "tagless": ["duration=8", "camera.rate=10"],
+}
+"""Changes that make the runs of an example shorter."""
+
+
 @pytest.mark.parametrize("name", example_names())
 def test_an_example_does_what_it_says_in_an_empty_folder(name, here, capfd, monkeypatch):
-    monkeypatch.setattr("sys.argv", [name])
+    simulate, shorter = cdpr.simulate, SHORTER.get(name, ())
+    monkeypatch.setattr(sys, "argv", [f"{name}.py"])
+    monkeypatch.setattr(
+        cdpr,
+        "simulate",
+        lambda what, words=(), *more, **named: simulate(what, [*words, *shorter], *more, **named),
+    )
     before = [dict(table) for table in TABLES]
     try:
         runpy.run_path(str(FOLDER / f"{name}.py"), run_name="__main__")

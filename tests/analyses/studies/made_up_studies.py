@@ -2,7 +2,6 @@
 
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.reporting.progress import WorkSession
@@ -35,15 +34,3 @@ def check_tables_are_made(found):
     tables = found.tables()
     assert all(table.row_count for table in tables)
     assert "not made" not in {str(column.header) for table in tables for column in table.columns}
-
-
-def check_told_apart_and_written(study, made_up, folder):
-    """All statements hold of good rows, and none of contrary ones; of both a figure is drawn."""
-    name = study.name.replace("-", "_")
-    for wrong, verdict in ((False, "confirmed"), (True, "not confirmed")):
-        found = made(study, partial(made_up, wrong=wrong))
-        assert {one.verdict for one in found.statements} == {verdict}
-        assert len(found.tables()) > 0
-        assert with_figures(found)[1] == {name} == set(study.figures)
-    assert not found.write(folder)
-    assert (folder / f"{name}.png").is_file()

@@ -5,11 +5,10 @@ import pandas as pd
 import pytest
 
 from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
-from cdpr_drake.analyses.studies import adaptation, calibration, identification
+from cdpr_drake.analyses.studies import calibration, identification
 from cdpr_drake.analyses.studies.facts import facts_of
 from cdpr_drake.analyses.studies.study import study_named, with_names_of_tables
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.studies.made_up_studies import check_told_apart_and_written
 
 STRAIGHT = {"true": 2.8e-4, "believed before": 5e-3, "calibrated": 2.9e-4}
 
@@ -141,23 +140,3 @@ def test_what_does_not_hold_is_not_confirmed(study, name, words, changes):
     others = verdicts(study, **changes)
     assert others.pop(name) == words
     assert all(one.startswith("confirmed") for one in others.values())
-
-
-def learning(case, seed, wrong=False):
-    """Learning is better than the wrong model and near the true one; with `wrong` contrary."""
-    model, learns = case.keys["model"], case.keys["model"] == adaptation.LEARNT
-    size = {adaptation.TRUE: 1.0, adaptation.LEARNT: 2.0 if wrong else 1.1}.get(model, 1.5)
-    return {
-        "outcome": "converged", "error_m": 1e-4 * size, "way_m": 0.3 * size,
-        "deviation_m": 0.01 * size, "off_m": 0.002 * size, "slack_s": 5.0 * size,
-        "before_m": 0.01 if learns else None,
-        "after_m": (0.02 if wrong else 0.005) if learns else None,
-        "largest_sigmas": (4.0 if wrong else 2.0) if learns else None,
-        "excited": 22 if learns else None, "believed": 5 if learns else None,
-        "rejected": 0 if learns else None, "doubts": [],
-        "doubted": learns and (case.keys["flaw"] != adaptation.NOTHING) != wrong,
-    }  # fmt: skip
-
-
-def test_statements_tell_good_learning_from_bad(tmp_path):
-    check_told_apart_and_written(adaptation.STUDY, learning, tmp_path)

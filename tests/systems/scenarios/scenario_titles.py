@@ -1,7 +1,7 @@
 """What the title of each shipped scenario names, as a check of a run's summary and log.
 
-Runs are those of the quick form of the study `scenarios`; what only a diagram can do is made short,
-with events that come sooner.
+Runs have projected targets; a run that only a diagram can do is made short, with events that come
+sooner.
 """
 
 import numpy as np

@@ -1,0 +1,89 @@
+"""Every shipped scenario ends as its file says, and does what its title names.
+
+Targets are projected where they can be, and long runs are cut. With CDPR_WHOLE_SCENARIOS=1 all run
+as they ship, rendered and to their end, which takes hours.
+"""
+
+import os
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.errors import CdprError, ScenarioError
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop, set_loop, uses_compiled_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
+from tests.systems.scenarios.scenario_titles import TITLES
+
+WHOLE = "CDPR_WHOLE_SCENARIOS" in os.environ
+
+LONGEST_LOOP, LONGEST_DIAGRAM = 100.0, 1.0
+"""Simulated time at most, by the compiled loop and by a diagram [s]."""
+
+LASTING = ("timeout", "completed")
+"""Outcomes of runs that last as long as they may."""
+
+
+def projected(name):
+    """The change that projects a scenario's target; none if it cannot be projected."""
+    change = ["camera.kind=projected"]
+    try:
+        load_scenario(name, change)
+    except CdprError:
+        return []
+    return change
+
+
+def shortened(name, items):
+    """A scenario with a projected target and changes that make it short, or cut after a time."""
+    scenario = load_scenario(name, [*projected(name), *items])
+    if SCENARIO_KINDS[scenario.kind].is_servo:
+        scenario = choose_compiled_loop(scenario)
+    else:
+        scenario = set_loop(scenario, repeated=True)[0]
+    if items and not uses_compiled_loop(scenario):
+        return scenario
+    longest = LONGEST_LOOP if uses_compiled_loop(scenario) else LONGEST_DIAGRAM
+    return replace(scenario, duration=min(scenario.duration, longest))
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_a_scenario_ends_as_its_file_says_and_does_what_its_title_names(name, tmp_path):
+    checks, items = TITLES[name]
+    shipped = load_scenario(name)
+    kind, expected = SCENARIO_KINDS[shipped.kind], shipped.expected
+    assert expected is not None
+    if WHOLE:
+        scenario = set_loop(shipped)[0]
+        kind.check(scenario)
+    else:
+        scenario = shortened(name, items)
+        kind.check(shortened(name, ()))
+    result = kind.run(scenario, RunSession(log_folder=tmp_path / "log"))
+    outcome = Outcome(result.outcome).name.lower()
+    if scenario.duration >= shipped.duration or outcome not in LASTING:
+        assert outcome == expected.outcome, result.message
+        distance, angle = kind.end_error(result)
+        assert expected.position is None or distance <= expected.position
+        assert expected.rotation_deg is None or np.degrees(angle) <= expected.rotation_deg
+    run = SimpleNamespace(
+        summary=kind.numbers(result),
+        log={key: np.array(rows) for key, rows in getattr(result, "log", {}).items()},
+        end=kind.end_error(result),
+        scheme=getattr(getattr(scenario, "controller", None), "scheme", None),
+    )
+    for check in () if WHOLE else checks:
+        assert check(run), (check.__name__, outcome)
+
+
+def test_an_ending_that_no_run_has_is_refused(tmp_path):
+    text = scenario_file("acrobot_pbvs").read_text()
+    path = tmp_path / "acrobot_pbvs.yaml"
+    path.write_text(text.replace("outcome: converged", "outcome: arrived"))
+    with pytest.raises(ScenarioError, match=r"expected\.outcome: found arrived; accepted: one of"):
+        load_scenario(str(path))
