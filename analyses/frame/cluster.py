@@ -6,6 +6,7 @@ worker unseen, and so that a worker that hangs keeps its own batches only.
 
 from __future__ import annotations
 
+import gc
 import logging
 import pickle
 import queue
@@ -332,5 +333,6 @@ def _connected(scheduler: str) -> Iterator[Any]:
             with suppress(Exception):
                 client.close(timeout=SCHEDULER_TIMEOUT)
     finally:
+        gc.collect()  # Dask's tasks that failed say so when they go
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)
