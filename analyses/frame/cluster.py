@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from cdpr_drake.analyses.frame.jobs import POLL, FinishedJob, ProcessDied, do_job, portable
+from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import SweepError
