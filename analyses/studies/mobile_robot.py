@@ -28,7 +28,8 @@ from cdpr_drake.analyses.studies.mobile_robot_figures import (
     VIEWED,
     of_views,
 )
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Row, Study
+from cdpr_drake.analyses.studies.rows import Row
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot, robot_reference

@@ -21,6 +21,7 @@ from typing import Any, Literal
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.studies.rows import Call
 from cdpr_drake.analyses.studies.stability_ranges_figures import (
     ANSWERS,
     PLANAR_ROBOT,
@@ -41,7 +42,7 @@ from cdpr_drake.analyses.studies.stability_recipe import (
     recipe_grid,
     single_bounds,
 )
-from cdpr_drake.analyses.studies.study import Call, Case, Form, Frame, Study, select
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles, pose_rows

@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.timing import interleaved, processor_seconds
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Row, Study
+from cdpr_drake.analyses.studies.rows import Row
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array

@@ -13,8 +13,9 @@ from cdpr_drake.analyses.studies.control_stability import (
 from cdpr_drake.analyses.studies.control_stability_figures import reasons, recipe_means, rule_means
 from cdpr_drake.analyses.studies.facts import facts_of, judged
 from cdpr_drake.analyses.studies.recipe_variants import IN_USE, RECIPES
+from cdpr_drake.analyses.studies.rows import digest
 from cdpr_drake.analyses.studies.stability_tables import BY_NAME, TABLES
-from cdpr_drake.analyses.studies.study import Form, StudyResult, digest
+from cdpr_drake.analyses.studies.study import Form, StudyResult
 from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
 
 MET = "met (fitted)"

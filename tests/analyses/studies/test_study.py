@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.studies import study as module
-from cdpr_drake.analyses.studies.study import ROWS, Case, Form, Study, digest, run_study, unit_of
+from cdpr_drake.analyses.studies.rows import ROWS, digest
+from cdpr_drake.analyses.studies.study import Case, Form, Study, run_study, unit_of
 from cdpr_drake.errors import CdprError, OutputFolderError
 
 CALLS = []
