@@ -31,19 +31,14 @@ FOLDERS = {
 
 LIBRARY = ("cdpr_drake", "#ffffff")
 
-STUDIES = "cdpr_drake.analyses.studies"
-
 WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 120, 26, 6, 6.9
 
 
 def layers() -> list[list[str]]:
-    """Modules and packages from the top layer down, siblings side by side; below the catalogue the
-    studies, which no contract lists, as one."""
+    """Modules and packages from the top layer down, siblings side by side."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contract = project["tool"]["importlinter"]["contracts"][0]
-    rows = [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
-    below = next(k for k, row in enumerate(rows) if f"{STUDIES}.catalogue" in row) + 1
-    return [*rows[:below], [STUDIES], *rows[below:]]
+    return [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
 
 
 def folder_of(module: str) -> tuple[str, str]:
@@ -82,8 +77,6 @@ def rooms() -> list[str]:
 
 def label(module: str) -> str:
     """What stands in a box: the path below its folder."""
-    if module == STUDIES:
-        return "studies, none of which knows another"
     words = module.removeprefix("cdpr_drake.").split(".")
     return (
         "/".join(

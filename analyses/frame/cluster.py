@@ -6,6 +6,7 @@ worker unseen, and so that a worker that hangs keeps its own batches only.
 
 from __future__ import annotations
 
+import gc
 import logging
 import pickle
 import queue
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from cdpr_drake.analyses.frame.jobs import POLL, FinishedJob, ProcessDied, do_job, portable
+from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import SweepError
@@ -332,5 +333,6 @@ def _connected(scheduler: str) -> Iterator[Any]:
             with suppress(Exception):
                 client.close(timeout=SCHEDULER_TIMEOUT)
     finally:
+        gc.collect()  # Dask's tasks that failed say so when they go
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)

@@ -8,17 +8,16 @@ the jobs by content, so that every job sees the same.
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from typing import Any, Generic, TypeVar
+from typing import Any, TypeVar
 
+from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
 from cdpr_drake.blas_threads import one_blas_thread, started_with_one_thread
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
@@ -28,9 +27,6 @@ from cdpr_drake.worker_process import become_worker
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
-POLL = 0.2
-"""Time between two looks at a request to stop [s]."""
-
 WORTH_PROCESSES = 10.0
 """Work left for which processes are started if nobody says how many [s]: each takes two to three
 seconds to load Drake and kernels."""
@@ -38,34 +34,6 @@ seconds to load Drake and kernels."""
 JOBS_PER_PROCESS = 200
 """A process is replaced after so many jobs: Drake's systems written in Python are never freed
 (Drake issue 24162)."""
-
-
-@dataclass(frozen=True, eq=False)
-class FinishedJob(Generic[Result]):
-    """A job that has ended.
-
-    Attributes:
-        number: Its index.
-        result: What it gave; None with a problem.
-        problem: Why it gave nothing; None if it did.
-        place: The worker of a cluster that did it; empty here.
-    """
-
-    number: int
-    result: Result | None = None
-    problem: Exception | None = None
-    place: str = ""
-
-    def words(self) -> str:
-        """The problem in one line, with its place."""
-        lines = (str(self.problem) or type(self.problem).__name__).splitlines()
-        kind = "" if isinstance(self.problem, SweepError) else f"{type(self.problem).__name__}: "
-        at = f" (on worker {self.place})" if self.place else ""
-        return f"{kind}{lines[0][:300]}{at}"
-
-
-class ProcessDied(SweepError):
-    """The process of a job died, for instance because memory ran out."""
 
 
 def default_workers() -> int:
@@ -126,27 +94,6 @@ def with_inputs(work: Callable[[Job], Result]) -> Callable[[Job], Result]:
     """What does a job in another process with the files that were read here."""
     files = inputs_held()
     return work if files is None else SentInputs(work, files)
-
-
-def do_job(work: Callable[[Job], Result], job: Job, number: int) -> FinishedJob[Result]:
-    """Does a job in this process; what it raises is its problem."""
-    try:
-        return FinishedJob(number, work(job))
-    except Exception as problem:
-        return FinishedJob(number, problem=problem)
-    except SystemExit as end:  # else a worker of a cluster ends, and others do the job again
-        return FinishedJob(number, problem=SweepError(f"SystemExit: {end}"))
-
-
-def portable(finished: FinishedJob[Result]) -> FinishedJob[Result]:
-    """The same for another process: what does not pickle becomes a problem in words."""
-    try:
-        pickle.loads(pickle.dumps(finished))
-        return finished
-    except Exception as unpicklable:
-        problem = finished.problem or unpicklable
-        words = f"{type(problem).__name__}: {problem}"
-        return FinishedJob(finished.number, problem=SweepError(words))
 
 
 def _in_processes(

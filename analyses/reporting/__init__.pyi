@@ -7,5 +7,4 @@ from .output_folder import continued_folder as continued_folder
 from .output_folder import results_folder as results_folder
 from .output_folder import resumed_folder as resumed_folder
 from .progress import WorkSession as WorkSession
-from .statements import verdict as verdict
 from .written_files import whole_file as whole_file

@@ -30,7 +30,9 @@ from cdpr_drake.analyses.studies.control_stability_figures import (
     reasons,
 )
 from cdpr_drake.analyses.studies.recipe_variants import (
+    CHOICES,
     EXCHANGED_CABLES,
+    FITTED_TABLES,
     FULLY_CONSTRAINED,
     IN_USE,
     OTHER_ANCHORS,
@@ -41,8 +43,6 @@ from cdpr_drake.analyses.studies.recipe_variants import (
     exchanged_anchors,
 )
 from cdpr_drake.analyses.studies.stability_recipe import (
-    CHOICES,
-    FITTED_TABLES,
     RECIPE,
     recipe_bounds,
     recipe_case,
@@ -314,7 +314,7 @@ def parameters(form: Form) -> Mapping[str, Any]:
     names = [form.recipe] if form.recipe else list(RECIPES)
     return {
         "recipe": RECIPE,
-        "choices": [asdict(choice) for choice in CHOICES],
+        "choices": list(CHOICES),
         "baseline": BASELINE_VALUES,
         "options": {
             table.name: asdict(recipe_options(table.robot)) for table in _tables(form, QUICK_TABLES)

@@ -298,6 +298,8 @@ class Part(Selection):
             return ""
         sizes = size if isinstance(size, list) else [size]
         values = ", ".join(f"{x:g}" if isinstance(x, float) else str(x) for x in sizes)
+        if self.comparison in ("rising", "falling"):
+            return self.comparison if sizes == [1.0] else f"{self.comparison} by a factor {values}"
         words = f"{self.comparison.rstrip('_').replace('_', ' ')} {values} {self._unit()}".strip()
         return words + (f" (within {self._nearness()})" if self.comparison == "about" else "")
 

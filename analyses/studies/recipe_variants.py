@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -17,7 +18,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.stability.perturbation_bounds import DIRECTIONS
+from cdpr_drake.schema.yaml_files import load_yaml
 
 FULLY_CONSTRAINED = "acrobot_fully_constrained"
 
@@ -49,9 +50,6 @@ LOWER_CORNER, OPPOSITE_CORNER, CENTRE = "lower corner", "opposite corner", "cent
 """Where spatial robots go under PBVS: to the lower corner of the grid's box from everywhere, from
 each pose to the corner that is farthest, or to the centre of the box."""
 
-HALF_TURN_DIAGONAL = (math.pi / math.sqrt(3.0),) * 3
-"""Half a turn about (1, 1, 1) [rad]."""
-
 PLATFORM, AS_BUILT, FACING_DOWN = "platform", "as built", "facing down"
 """Camera at the platform's origin and aligned with it; as in the robot's file; or above the origin,
 by `CAMERA_HEIGHTS`, and looking down."""
@@ -78,11 +76,6 @@ class View:
 
     place: tuple[float, float, float] = (0.0, -0.4, 0.45)
     turn: tuple[float, float, float] = (-math.radians(120.0), 0.0, 0.0)
-
-
-STRAIGHT_AHEAD = View((0.0, 0.0, 0.46), (0.0, 0.0, math.pi))
-"""The object on the optical axis, half a turn about it to go. No turn about it matters: of theta u
-the third row of (1.46) alone counts, and c*_R_c turns the first three features as a whole."""
 
 
 @dataclass(frozen=True)
@@ -183,144 +176,22 @@ def exchanged_anchors(cables: CableSet, one: int, other: int) -> CableSet:
     return replace(cables, p_PB=cables.p_PB[:, order])
 
 
-SEEN_TURNED = dict.fromkeys(("acrobot_small", "acrobot_large"), (0.0, 0.0, math.radians(140.0)))
-"""Rotation errors about z of the suspended robots where what is seen is turned, too [rad]. With an
-error of the mounting of 40 deg and more theta u and its error pass half a turn together."""
+FILE = load_yaml(Path(__file__).with_name("recipes.yaml").read_text(encoding="utf-8"))
 
-CAMERA_ROWS = "A.14, A.15"
-"""With these rows in sight the height of the camera and the view straight ahead were chosen."""
+CHOICES: tuple[Mapping[str, str], ...] = tuple(FILE["choices"])
+"""What was chosen: what, text: what the thesis says of it, chosen, rows: with which rows in sight.
+Not recorded: which single rows of the tables that are not in `FITTED_TABLES` were at hand, too."""
 
-PRESENT = Recipe("present", "the recipe of the study until `one-camera`, see the assumptions")
+FITTED_TABLES = ("A.8", "A.10", "A.11", "A.12", "A.14", "A.15", "A.17")
+"""Tables all of whose rows were in sight when the recipe was chosen."""
 
 RECIPES = {
-    recipe.name: recipe
-    for recipe in (
-        PRESENT,
-        Recipe(
-            "upper-on-upper",
-            "fully constrained ACROBOT: cables from above hold the upper anchor points",
-            anchors=UPPER_ON_UPPER,
-            sight="baseline of A.11",
-        ),
-        Recipe(
-            "upper-on-upper-independent",
-            "the same, and its points wrong each in a direction of its own where they are varied",
-            anchors=UPPER_ON_UPPER,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            sight="baseline, r_A and r_B of A.11",
-        ),
-        Recipe(
-            "other-corners-independent",
-            "the same, at the other corners",
-            anchors=OTHER_CORNERS,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            sight="baseline, r_A and r_B of A.11",
-        ),
-        Recipe(
-            "kept-cables",
-            "fully constrained ACROBOT: the suspended one's cables, four exit points moved down",
-            anchors=KEPT_CABLES,
-        ),
-        Recipe(
-            "lower-on-upper-independent",
-            "the same, and cables from the floor hold the upper anchor points",
-            anchors=LOWER_ON_UPPER,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            sight="baseline, r_A and r_B of A.11",
-        ),
-        *(
-            Recipe(
-                f"points-{directions}",
-                f"points of every robot wrong by {directions} directions where they are varied",
-                points=dict.fromkeys(VARIED_POINTS, directions),
-            )
-            for directions in DIRECTIONS
-        ),
-        Recipe(
-            "hybrid-exits-independent",
-            "ACROBOT under 2 1/2 D: each exit point wrong in a direction of its own",
-            points={**VARIED_POINTS, "2.5d r_A acrobot": "independent"},
-            sight="r_A of A.14",
-        ),
-        Recipe(
-            "caroca-single",
-            "CAROCA under PBVS: one point wrong at a time",
-            points={**VARIED_POINTS, "pbvs caroca": "single"},
-            sight="r_A and r_B of A.12",
-        ),
-        Recipe(
-            "camera-as-built",
-            "camera where it is mounted, facing down",
-            camera=AS_BUILT,
-        ),
-        Recipe(
-            "turned-about-diagonal",
-            "PBVS of spatial robots: half a turn about (1, 1, 1)",
-            turn=HALF_TURN_DIAGONAL,
-        ),
-        Recipe(
-            "opposite-corner",
-            "the same, to the corner of the box that is farthest from the pose",
-            goal=OPPOSITE_CORNER,
-            turn=HALF_TURN_DIAGONAL,
-        ),
-        Recipe(
-            "facing-down",
-            "one camera for all schemes, above the platform's origin and facing down, and under "
-            "2 1/2 D the object straight ahead",
-            view=STRAIGHT_AHEAD,
-            camera=FACING_DOWN,
-            sight=CAMERA_ROWS,
-        ),
-        Recipe(
-            "one-camera",
-            "facing-down and other-corners-independent at once",
-            anchors=OTHER_CORNERS,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            view=STRAIGHT_AHEAD,
-            camera=FACING_DOWN,
-            sight=f"{CAMERA_ROWS}; baseline, r_A and r_B of A.11",
-        ),
-        Recipe(
-            "one-exchange",
-            "one-camera, but the fully constrained ACROBOT has two exit points of table 3.1 in "
-            "each other's place and goes to the centre",
-            anchors=EXCHANGED,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            goals={FULLY_CONSTRAINED: CENTRE},
-            view=STRAIGHT_AHEAD,
-            camera=FACING_DOWN,
-            sight=f"{CAMERA_ROWS}, A.11",
-        ),
-        Recipe(
-            "best-of-each",
-            "one-exchange and caroca-single at once",
-            anchors=EXCHANGED,
-            goals={FULLY_CONSTRAINED: CENTRE},
-            points={
-                **VARIED_POINTS,
-                FULLY_CONSTRAINED: "independent",
-                "pbvs caroca": "single",
-            },
-            view=STRAIGHT_AHEAD,
-            camera=FACING_DOWN,
-            sight=f"{CAMERA_ROWS}, A.11; r_A and r_B of A.12",
-        ),
-        Recipe(
-            "seen-turned",
-            "one-exchange, but for the suspended ACROBOT under PBVS an error of the camera's "
-            "mounting also turns what is seen, and theta u is 140 deg about z",
-            anchors=EXCHANGED,
-            points={**VARIED_POINTS, FULLY_CONSTRAINED: "independent"},
-            goals={FULLY_CONSTRAINED: CENTRE},
-            seen=SEEN_TURNED,
-            view=STRAIGHT_AHEAD,
-            camera=FACING_DOWN,
-            sight=f"{CAMERA_ROWS}, A.11; d_theta_pc of A.9 and A.10",
-        ),
-    )
+    entry["name"]: Recipe(**{**entry, "view": View(**entry.get("view", {}))})
+    for entry in FILE["recipes"]
 }
 """All of them, by name."""
+
+PRESENT = RECIPES["present"]
 
 EXCHANGED_CABLES = RECIPES["one-exchange"]
 """The recipe with EXCHANGED."""

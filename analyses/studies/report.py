@@ -161,7 +161,9 @@ def reproduce(
                 failed[name] = f"{kind}{problem}"
                 follow.say(f"{name}: {failed[name]}")
                 continue
-            if found.interrupted:
+            if found.failed:
+                failed[name] = "; ".join(found.failed.values())
+            if found.stopped:
                 left.append(name)
         report = reproduction_of(results.path, names, quick, failed, left, older)
         results.write_text(VERDICTS_FILE, _json(_verdicts(report.facts())))

@@ -127,11 +127,11 @@ def met(rows: Frame, **where: Any) -> dict[str, Any]:
 
 def settings_tried(rows: Frame) -> Frame:
     """What could make tensions as large as the printed ones, and how many each setting meets."""
-    starts = [
+    starts: list[dict[str, Any]] = [
         {"experiment": tt.START_ERROR, "start": start, "balance": balance, "control_rate_hz": rate}
         for start, rate, balance in product(tt.STARTS, tt.RATES, (WRENCH, FORCE))
     ]
-    pulses = [
+    pulses: list[dict[str, Any]] = [
         {"experiment": tt.ONE_STEP, "start": start, "between": between}
         for start, between in product((tt.LAUNCH, tt.ON_PATH), (tt.STATIC, tt.NOTHING))
     ]

@@ -13,8 +13,8 @@ import pandas as pd
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.workspaces import CameraTask, make_question
-from cdpr_drake.stability import FixedObject
-from cdpr_drake.stability.verdict import VERDICTS, judge_all_verdicts
+from cdpr_drake.geometry import pose_rows
+from cdpr_drake.stability import FixedObject, verdict
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 
@@ -50,13 +50,13 @@ def run_block(block, count=20):
             run = cdpr.simulate(replace(scenario, initial_pose=start, seed=seed))
             row = {"scheme": scheme, "outcome": run.numbers["outcome"]}
             row["turn"] = f"from {np.degrees(R.ToAngleAxis().angle()) // 30 * 30:.0f} deg"
-            verdicts = judge_all_verdicts(question.case, bounds, [X_WP])
-            rows.append(row | {name: 100.0 * verdicts[name].stable[0] for name in VERDICTS})
+            verdicts = verdict.judge_all_verdicts(question.case, bounds, pose_rows([X_WP]))
+            rows.append(row | {name: 100.0 * each.stable[0] for name, each in verdicts.items()})
     return rows
 
 
 if __name__ == "__main__":  # workers are new processes, which import this file
-    starts = range(0, int((sys.argv[1:] or [60])[0]), 20)
+    starts = range(0, int(sys.argv[1]) if sys.argv[1:] else 60, 20)
     blocks = [(name, first) for first in starts for name in ("pbvs", "2.5d", "ibvs")]
     rows = pd.DataFrame(row for job in finished_jobs(run_block, blocks) for row in job.result)
     for by in ("scheme", ["scheme", "turn"]):

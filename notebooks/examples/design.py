@@ -11,7 +11,7 @@ import numpy as np
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.design import DesignSettings, GoalSettings, MirrorSettings
 
-generations = int((sys.argv[1:] or [2])[0])
+generations = int(sys.argv[1]) if sys.argv[1:] else 2
 for robot, goal, force, anchors in (
     ("acrobot_large", "wrench-feasible", 5.0, 0.0),
     ("caroca", "csw", 0.0, 0.05),

@@ -31,8 +31,9 @@ def is_blocked(sets, start, goal):
 
 
 random = np.random.default_rng(0)
+count = int(sys.argv[1]) if sys.argv[1:] else 1
 print("robot, scene, straight [m], proven [m], bound [m], time [s], samples that fail")
-for name, scene in list(product(ROBOTS, SCENES))[: int((sys.argv[1:] or [1])[0])]:
+for name, scene in list(product(ROBOTS, SCENES))[:count]:
     robot = cdpr.load_robot(name)
     low, high = robot.reach()
     boxes = [box_row(low + m * (high - low), s * (high - low)) for m, s in np.array(SCENES[scene])]

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.planning.rest_to_rest import example_robot
 from cdpr_drake.planning.input_shaping import SHAPERS
 from cdpr_drake.systems.robots.settings import CableSettings
 
-off = float((sys.argv[1:] or [10])[0]) / 100.0
+off = float(sys.argv[1]) / 100.0 if sys.argv[1:] else 0.1
 robot = example_robot()  # planar, on four cables of rubber
 ends = RigidTransform([-0.1, 0.05, 0.3]), RigidTransform([0.15, -0.05, 0.3])
 duration, bounds = 0.45, (10.0, 60.0)  # before it is shaped [s]; tensions [N]

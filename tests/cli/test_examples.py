@@ -64,15 +64,13 @@ def converges_where_certified(out):
 
 
 def is_proven_and_hardly_longer(out):
-    straight, proven, bound, _, wrong = numbers(
-        r"wall" + 5 * r", ([\d.]+)", out
-    ).T  # fmt: skip
+    straight, proven, bound, _, wrong = numbers("wall" + 5 * r", ([\d.]+)", out).T
     close = (straight < bound) & (bound <= proven * (1.0 + 1e-6)) & (proven < 1.1 * straight)
     return len(proven) == 2 and np.all(close) and not np.any(wrong)
 
 
-def gains(out):
-    return "acrobot_large" in out and "caroca" in out
+def says_what_is_proven(out):
+    return len(numbers(r"proven +[a-z-]+ ([\d.]+) to ([\d.]+)", out)) == 2
 
 
 def leaves_less_swing(out):
@@ -166,7 +164,7 @@ def one_winds_and_one_waits(out):
 
 
 SAID = {
-    "basin": converges_where_certified, "calibrate": calibrates, "design": gains,
+    "basin": converges_where_certified, "calibrate": calibrates, "design": says_what_is_proven,
     "learning": learns, "monte_carlo": repeats,
     "own_controller": winds_to_the_goal, "own_estimator": logs_beside,
     "own_robot": is_heavier_saved_and_asked, "own_scheme": both_schemes_arrive,

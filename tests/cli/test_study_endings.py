@@ -151,10 +151,12 @@ def raise_error():
 
 def test_a_row_that_fails_is_named_and_the_others_are_kept(run, here):
     EVENTS[2] = raise_error
-    code, _, err = run(*STUDY)
-    assert code == 5
-    assert "cdpr: failed: x 2: RuntimeError: no such thing" in err
-    assert squares(here / "r") == [0.0, 1.0, 9.0]
+    for words, folder in ((STUDY, here / "r"), (REPRODUCE[:-1], here / "all" / "toy")):
+        command = (*words, "all") if words != STUDY else words
+        code, _, err = run(*command)
+        assert code == 5
+        assert "failed: toy: " * (words != STUDY) + "x 2: RuntimeError: no such thing" in err
+        assert squares(folder) == [0.0, 1.0, 9.0]
     EVENTS.clear()
     assert run(*STUDY)[0] == 0
 

@@ -28,7 +28,7 @@ CAMEL = re.compile(r"_?(?:[A-Z][a-z0-9]+){2,}|[A-Z][a-z]+[A-Z]\w*")
 SNAKE = re.compile(r"[A-Za-z]\w*_\w*")
 
 FILE = re.compile(
-    r".*\.(csv|html|ipynb|json|jpg|md|mp4|npz|mat|pdf|png|py|pyi|toml|tsv|txt|xml|yaml|yml)"
+    r".*\.(csv|html|ipynb|jsonl?|jpg|md|mp4|npz|mat|pdf|png|py|pyi|toml|tsv|txt|xml|yaml|yml)"
 )
 """Names of files, which are no keys."""
 

@@ -11,7 +11,8 @@ from functools import partial
 import pytest
 
 from cdpr_drake.analyses.frame import cluster as module
-from cdpr_drake.analyses.frame.jobs import ProcessDied, finished_jobs
+from cdpr_drake.analyses.frame.job import ProcessDied
+from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.schema.input_files import input_text, inputs_read_once
 from tests.analyses.frame.test_jobs import read, square

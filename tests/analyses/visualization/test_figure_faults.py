@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.studies.framework.case_panels import draw_path, fit_box
+from cdpr_drake.analyses.studies.servo_figures import fit_box, path
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
 from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
 from cdpr_drake.palette import nth_look
@@ -88,7 +88,7 @@ def test_numbers_and_names_of_axes_in_space_do_not_meet(size, columns, ends):
     figure = bare_figure(size, "Path of the camera, Co, in the world frame W")
     with styled():
         axes = figure.add_subplot(1, columns, 1, projection="3d")
-        draw_path(axes, np.linspace(*ends, 20), nth_look(0), "camera")
+        path(axes, np.linspace(*ends, 20), nth_look(0), "camera")
         fit_box(axes, np.array(ends))
         figure.legend(loc="outside lower center")
     assert figure_faults(figure) == []
