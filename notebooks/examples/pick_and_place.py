@@ -1,4 +1,4 @@
-"""Pick and place: where a box is set down, with its goal in view, hidden, or seen by no camera.
+"""Pick and place: where a box is set down, with its goal in view, hidden, or not seen past the box.
 
 `python pick_and_place.py 20 rendered` takes twenty seeds and rendered images, over an hour.
 """
@@ -13,7 +13,7 @@ CASES = {
     "in view": "cover=null",
     "hidden for 3 s while carried": "cover={phase: carry, delay: 0.5, duration: 3.0}",
     "hidden for 3 s while lowered": "cover={phase: lower, delay: 0.5, duration: 3.0}",
-    "one camera, which the box blinds": "goal_camera=null",
+    "seen by one camera, whose view the box fills": "goal_camera=null",
 }
 
 count = int(sys.argv[1]) if sys.argv[1:] else 1
