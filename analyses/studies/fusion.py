@@ -293,10 +293,9 @@ def image_errors(result: RunResult, seed: int) -> Array:
         points=POINTS, noise=NOISE, seed=seed,
     )  # fmt: skip
     errors = list[float]()
-    for k, surplus in enumerate(log["surplus_lengths"][:, CABLES]):
-        if not np.any(surplus > TAUT):
-            continue
-        pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], k)
+    surpluses = log["surplus_lengths"][:, CABLES]
+    for k in np.flatnonzero(np.any(surpluses > TAUT, axis=1)):
+        pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], int(k))
         try:
             image = slack_from_image(
                 pixels.reshape(len(robot.cables), 2, -1), cables,
@@ -304,7 +303,7 @@ def image_errors(result: RunResult, seed: int) -> Array:
             )  # fmt: skip
         except CableGeometryError:
             continue
-        errors += (image.surplus[CABLES] - surplus)[surplus > TAUT].tolist()
+        errors += (image.surplus[CABLES] - surpluses[k])[surpluses[k] > TAUT].tolist()
     return np.array(errors)
 
 

@@ -34,7 +34,7 @@ DRAWN = 2e4
 """Larger tensions, of platforms that are lost, are drawn as this [N]."""
 
 DASHES = {tt.Applied.HELD: SOLID, tt.Applied.CUT: DOTTED, tt.Applied.PUSHED: DASHED}
-GAINS = tuple(sorted({gain for gains in tt.THESIS_GAINS.values() for gain in gains}))
+GAINS = tt.THESIS_GAINS["quadratic_program"]
 """All gains Kp of the study, each with its colour and marker in all figures [1/s^2]."""
 
 
@@ -96,11 +96,8 @@ def near_instability(rows: Frame) -> tuple[list[bool], str]:
 
 
 def settings_tried(rows: Frame) -> Frame:
-    """What could make tensions as large as the printed ones, and how many each setting meets.
-
-    A row for each setting; largest tensions by method, and how many of the twelve printed ones they
-    meet.
-    """
+    """What could make tensions as large as the printed ones: the largest by setting and method, and
+    how many of the twelve printed ones they meet."""
     settings: list[dict[str, Any]] = [
         {"experiment": tt.START_ERROR, "start": start, "balance": balance, "control_rate_hz": rate}
         for start, rate, balance in product(tt.STARTS, tt.RATES, (WRENCH, FORCE))
@@ -158,8 +155,7 @@ def error_figure(experiment: str, rows: Frame) -> Figure:
     """Position errors over time of the runs of one experiment, a panel for each method."""
     mine = select(rows, experiment=experiment)
     methods = dict([*mine.groupby("method", sort=False)])
-    gains = sorted({*GAINS, *mine["kp_per_s2"]})
-    drawn, panels = _panels(len(methods), f"Position error, {_title(experiment)}")
+    drawn, panels = _panels(len(methods), "Position error", experiment, "error [mm]")
     for axes, (method, runs) in zip(panels, methods.items(), strict=True):
         fell = []
         for _, run in runs.iterrows():
@@ -168,11 +164,11 @@ def error_figure(experiment: str, rows: Frame) -> Figure:
                 fell.append(f"{name} fell at {run['end_time_s']:.2f} s")
             if run["lost"] and run["end_time_s"] < 0.05 * run["wanted_duration_s"]:
                 continue  # would not be seen
-            number, arrays = gains.index(run["kp_per_s2"]), run["arrays"]
+            number, arrays = GAINS.index(run["kp_per_s2"]), run["arrays"]
             look = Look(nth_look(number).color, DASHES[run["applied"]], nth_look(number).marker)
             errors = np.maximum(1e3 * arrays["errors_m"], 1e-9)
             draw_curve(axes, arrays["times_s"], errors, look, name,
-                       phase=phase_of(number, len(gains)), markersize=4.0)  # fmt: skip
+                       phase=phase_of(number, len(GAINS)), markersize=4.0)  # fmt: skip
         axes.set(yscale="log", xlim=(0.0, mine["wanted_duration_s"].max()))
         axes.set_title(words_of(method), fontsize=11)
         lines = ["; ".join(fell[k : k + 2]) for k in range(0, len(fell), 2)]
@@ -181,7 +177,6 @@ def error_figure(experiment: str, rows: Frame) -> Figure:
             ncols=2, loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=5.0,
         )  # fmt: skip
     _same_heights(panels)
-    _name_axes(panels, "error [mm]")
     return drawn
 
 
@@ -193,7 +188,7 @@ def tension_figure(experiment: str, rows: Frame) -> Figure:
     for _, group in (up if len(up) else mine).groupby(["method", "applied"], sort=False):
         ordered = [run for _, run in group.sort_values("kp_per_s2").iterrows()]
         chosen += ordered[:1] + ordered[1:][-1:]
-    drawn, panels = _panels(len(chosen), f"Tensions, {_title(experiment)}")
+    drawn, panels = _panels(len(chosen), "Tensions", experiment, "tension [N]")
     for axes, run in zip(panels, chosen, strict=True):
         high = _draw_tensions(axes, run)
         applied = "" if run["applied"] == "held" else f", {run['applied']}"
@@ -201,7 +196,6 @@ def tension_figure(experiment: str, rows: Frame) -> Figure:
         if high <= 1.5 * float(np.max(run["arrays"]["tensions_n"], initial=0.0)):
             style = line_style(BOUND) | {"linewidth": 1.0, "zorder": 1}
             axes.axhline(high, label=f"upper bound {high:g} N", **style)
-    _name_axes(panels, "tension [N]")
     found = [axes.get_legend_handles_labels() for axes in panels]
     handles = {k: v for some, names in found for k, v in zip(names, some, strict=True)}
     drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
@@ -336,25 +330,18 @@ def _draw_tensions(axes: Any, run: Mapping[str, Any]) -> float:
     return float(high)
 
 
-def _title(experiment: str) -> str:
-    return f"experiment '{experiment}'\n{tt.EXPERIMENTS[experiment].rstrip('.')}"
-
-
-def _panels(count: int, title: str) -> tuple[Figure, list[Axes]]:
+def _panels(count: int, what: str, experiment: str, ylabel: str) -> tuple[Figure, list[Axes]]:
+    title = f"{what}, experiment '{experiment}'\n{tt.EXPERIMENTS[experiment].rstrip('.')}"
     columns = min(3, count)
     rows = -(-count // columns)
     drawn, grid = new_figure(rows, columns, (max(4.2 * columns, 9.0), 1.2 + 3.2 * rows), title)
     panels: list[Axes] = list(np.ravel(grid))
-    for axes in panels[count:]:
-        axes.remove()
-    return drawn, panels[:count]
-
-
-def _name_axes(panels: Sequence[Axes], ylabel: str) -> None:
-    columns = min(3, len(panels))
     for k, axes in enumerate(panels):
         axes.set_ylabel(ylabel if k % columns == 0 else "")
-        axes.set_xlabel("time [s]" if k + columns >= len(panels) else "")
+        axes.set_xlabel("time [s]" if k + columns >= count else "")
+        if k >= count:
+            axes.remove()
+    return drawn, panels[:count]
 
 
 def _same_heights(panels: Sequence[Axes]) -> None:

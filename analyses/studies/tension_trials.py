@@ -218,9 +218,6 @@ LOOK = 1.0
 PULSE_RATE = 1.0 / STEP
 """Steps of Gazebo per second; forces that are set for one act so long [Hz]."""
 
-LAST_PART = 0.5
-"""Share of a run in which what came of its start is over."""
-
 NOTHING, STATIC = "nothing", "tensions of rest"
 """What acts between steps in which commanded forces do; the second acts in these too."""
 
@@ -233,14 +230,8 @@ class PulsedDistributor(UncheckedDistributor):
     """
 
     def __init__(self, *settings: Any, every: int, between: Array, **options: Any) -> None:
-        """Arguments as of `TensionDistributor`, with the rate of Gazebo's steps.
-
-        Args:
-            settings: Of `TensionDistributor`.
-            every: Steps of Gazebo from one control step to the next.
-            between: Tensions that act all the time, shape (m,) [N].
-            options: Of `TensionDistributor`.
-        """
+        """Arguments as of `TensionDistributor`; beside them steps of Gazebo in a control step, and
+        tensions that act between, shape (m,) [N]."""
         super().__init__(*settings, **options)
         self._every, self._between = every, between
 
@@ -381,13 +372,12 @@ def run_start_trial(spec: StartTrial) -> dict[str, Any]:
     where = np.array([control.trajectory.motion(time)[4:7] for time in times[tenth]])
     away = np.linalg.norm(states[tenth, 4:7] - where, axis=1)
     q = states[:, :4] / np.linalg.norm(states[:, :4], axis=1)[:, np.newaxis]
-    last = asked[round((1.0 - LAST_PART) * len(asked)) :]
     return {
         "start_error_m": start_error, "wanted_duration_s": spec.duration,
         "end_time_s": times[-1], "lost": lost,
         "tension_max_n": np.max(asked), "tension_min_n": np.min(asked),
         "tension_first_max_n": np.max(asked[0]),
-        "tension_last_max_n": None if lost else np.max(last),
+        "tension_last_max_n": None if lost else np.max(asked[round(0.5 * len(asked)) :]),
         "turn_max_rad": 2.0 * np.max(np.arctan2(np.linalg.norm(q[:, 1:], axis=1), np.abs(q[:, 0]))),
         "position_error_last_tenth_m": np.mean(away),
         "failures": int(log["failures"][-1, 0]), "control_steps": len(asked),
@@ -484,12 +474,18 @@ THESIS_END = (3.0, 1.0, 3.0)
 THESIS_DURATION = 100.0
 """Gazebo thesis 6.2 [s]."""
 
-THESIS_GAINS: dict[str, tuple[float, ...]] = {
-    "linear_program": (100.0, 800.0, 1200.0),
-    "quadratic_program": (100.0, 800.0, 1200.0, 1500.0),
-    "pseudo_inverse": (100.0, 800.0, 1200.0),
-    "closed_form": (100.0, 800.0, 1200.0),
+PRINTED = {
+    "linear_program": (54.0, 456.0, 1224.0),
+    "quadratic_program": (32.0, 110.0, 342.0),
+    "pseudo_inverse": (117.0, 117.0, 117.0),
+    "closed_form": (267.0, 385.0, 517.0),
 }
+"""Largest tension by method at `GAINS` [N]. Source: Gazebo thesis 6.4.1 to 6.4.4."""
+
+GAINS = (100.0, 800.0, 1200.0)
+"""Gains Kp at which these are printed [1/s^2]."""
+
+THESIS_GAINS = dict.fromkeys(PRINTED, GAINS) | {"quadratic_program": (*GAINS, 1500.0)}
 """Kp = Kd of the methods that the Gazebo thesis runs, figures 6.8 to 6.20 [1/s^2, 1/s]."""
 
 UNCHECKED = ("pseudo_inverse", "closed_form")
@@ -507,7 +503,6 @@ EXPERIMENTS = {
     "acrobot": "acrobot_large there and back, Kp = 100, Kd = 20, 1 kHz.",
 }
 """What the experiments are, by name."""
-
 
 GRID, QUICK_GRID = (13, 13, 9), (5, 5, 3)
 """Poses on which methods are compared, along x, y and z."""
@@ -528,24 +523,26 @@ def printed_ends() -> tuple[Array, Array]:
 
 
 def trials(quick: bool) -> list[TensionTrial]:
-    """All runs, or short ones that only show that everything works, in the order of the
-    experiments."""
+    """All runs, or short ones of some, in the order of the experiments."""
     ends, home = thesis_path().ends, load_robot(THESIS_ROBOT).home.position
     gains = {method: some[:1] if quick else some for method, some in THESIS_GAINS.items()}
-    thesis = partial(straight_trial, "thesis", ends, 1.0 if quick else THESIS_DURATION)
-    printed = partial(
-        straight_trial, "printed", printed_ends(), 0.5 if quick else THESIS_DURATION,
-        applied=Applied.PUSHED,
-    )  # fmt: skip
+    if not quick:
+        gains |= {"improved_closed_form": (100.0,), "barycenter": (100.0,)}
+    duration = 1.0 if quick else THESIS_DURATION
     specs = [
-        thesis(method, gain, applied=applied)
+        straight_trial("thesis", ends, duration, method, gain, applied=applied)
         for method, some in gains.items()
         for gain in some
         for applied in (Applied if method in UNCHECKED else [Applied.HELD])
     ]
-    if not quick:
-        specs += [thesis(method, 100.0) for method in ("improved_closed_form", "barycenter")]
-    specs += [printed(method, gain) for method in UNCHECKED for gain in gains[method]]
+    specs += [
+        straight_trial(
+            "printed", printed_ends(), 0.5 if quick else THESIS_DURATION, method, gain,
+            applied=Applied.PUSHED,
+        )
+        for method in UNCHECKED
+        for gain in gains[method]
+    ]  # fmt: skip
     if not quick:
         specs += [
             straight_trial(
@@ -556,8 +553,10 @@ def trials(quick: bool) -> list[TensionTrial]:
             for method in ("linear_program", "quadratic_program")
             for gain in gains[method]
         ]  # fmt: skip
-        slow = partial(straight_trial, "slow", ends, 20.0, "quadratic_program", rate=100.0)
-        specs += [slow(gain) for gain in gains["quadratic_program"]]
+        specs += [
+            straight_trial("slow", ends, 20.0, "quadratic_program", gain, rate=100.0)
+            for gain in gains["quadratic_program"]
+        ]
     return specs + acrobot_trials(quick)
 
 
@@ -575,7 +574,7 @@ def straight_trial(
 
 def acrobot_trials(quick: bool) -> list[TensionTrial]:
     """Runs of the other robot, by every method that fits it."""
-    robot, leg = load_robot(OTHER_ROBOT), 2.0
+    robot = load_robot(OTHER_ROBOT)
     home = robot.home.transform()
     away = pose_from_angles(
         home.translation() + np.array([0.2, -0.15, 0.25]), np.radians([4.0, -3.0, 6.0])
@@ -585,9 +584,8 @@ def acrobot_trials(quick: bool) -> list[TensionTrial]:
         methods = ["quadratic_program", "improved_closed_form"]
     return [
         TensionTrial(
-            experiment="acrobot", robot=OTHER_ROBOT, path=(home, away, home), legs=(leg, leg),
-            method=method, stiffness=100.0, damping=20.0,
-            duration=0.5 if quick else 2.0 * leg + 0.5,
+            experiment="acrobot", robot=OTHER_ROBOT, path=(home, away, home), legs=(2.0, 2.0),
+            method=method, stiffness=100.0, damping=20.0, duration=0.5 if quick else 4.5,
         )
         for method in methods
     ]  # fmt: skip
@@ -613,17 +611,6 @@ STARTS = (*ERRORS, LAUNCH)
 
 RATES = (1000.0, 100.0)
 """A step of Gazebo, and the publisher of the public code [Hz]."""
-
-GAINS = (100.0, 800.0, 1200.0)
-"""Gains Kp at which largest tensions are printed [1/s^2]."""
-
-PRINTED = {
-    "linear_program": (54.0, 456.0, 1224.0),
-    "quadratic_program": (32.0, 110.0, 342.0),
-    "pseudo_inverse": (117.0, 117.0, 117.0),
-    "closed_form": (267.0, 385.0, 517.0),
-}
-"""Largest tension by method at these gains [N]. Source: Gazebo thesis 6.4.1 to 6.4.4."""
 
 
 def start_trials(quick: bool) -> list[StartTrial]:
@@ -709,16 +696,17 @@ def cover(robot_name: str, counts: tuple[int, int, int], method: str) -> dict[st
         the batch form on one core.
     """
     problems = grid_problems(load_robot(robot_name), counts)
-    truth = np.array([distribute(p, TRUTH).status == TensionStatus.FEASIBLE for p in problems])
-    feasible = [p for p, good in zip(problems, truth, strict=True) if good]
     solutions = [distribute(p, method) for p in problems]
-    solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
-    said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])
-    largest = [float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good]
+    truth = np.array([distribute(p, TRUTH).status for p in problems]) == TensionStatus.FEASIBLE
+    said = np.array([solution.status for solution in solutions])
+    solved = said == TensionStatus.FEASIBLE
+    feasible = [p for p, good in zip(problems, truth, strict=True) if good]
+    largest = [np.max(s.tensions) for s in solutions if s.status == TensionStatus.FEASIBLE]
     found = int(np.sum(solved & truth))
     return {
         "poses": len(problems), "feasible": len(feasible), "solved": found,
-        "share": found / max(len(feasible), 1), "wrong": int(np.sum(said != truth)),
+        "share": found / max(len(feasible), 1),
+        "wrong": int(np.sum((said != TensionStatus.INFEASIBLE) != truth)),
         "mean_largest_tension_n": float(np.mean(largest)) if largest else None,
         **_times(method, feasible[:TIMED]),
     }  # fmt: skip

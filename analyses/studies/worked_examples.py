@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from itertools import product
 from math import perm
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -157,11 +157,6 @@ def trajectory() -> Row:
 # Polygons.
 
 
-def limits() -> tuple[float, float]:
-    """Smallest and largest tension of these examples [N]."""
-    return LEAST, load_robot(ROBOT).tension_limits()[1]
-
-
 def polygon(pose: str) -> Row:
     """The polygon of figure 1.19 at a pose of `POSES`.
 
@@ -173,8 +168,8 @@ def polygon(pose: str) -> Row:
     """
     robot = load_robot(ROBOT)
     X_WP = pose_from_angles(np.array(POSES[pose]), np.zeros(3))
-    cables = robot.cable_set(pulleys=False)
-    problem = tension_problem(robot, X_WP, limits=limits(), cables=cables)
+    limits, cables = (LEAST, robot.tension_limits()[1]), robot.cable_set(pulleys=False)
+    problem = tension_problem(robot, X_WP, limits=limits, cables=cables)
     tensions = {method: distribute(problem, method).tensions for method in SHOWN}
     _, N = solution_space(problem)
     x, y = vertices = feasible_polygon(problem)
@@ -202,7 +197,9 @@ def held_problems(counts: tuple[int, int, int]) -> list[TensionProblem]:
     Args:
         counts: Positions along x, y and z.
     """
-    problems = grid_problems(load_robot(ROBOT), counts, [(0.0, 0.0, 0.0)], limits())
+    robot = load_robot(ROBOT)
+    limits = (LEAST, robot.tension_limits()[1])
+    problems = grid_problems(robot, counts, [(0.0, 0.0, 0.0)], limits)
     return [p for p in problems if distribute(p, TRUTH).status == TensionStatus.FEASIBLE]
 
 
@@ -225,19 +222,17 @@ def methods(grid: tuple[int, int, int], repeats: int) -> Row:
     w = np.tile(np.array([p.wrench for p in problems]), (again, 1))
     low, high = problems[0].lower, problems[0].upper
 
-    def cost(method: str) -> float:
-        return processor_seconds(lambda: distribute_batch(W, w, low, high, method, threads=1))
-
-    seconds = interleaved([partial(cost, method) for method in COMPARED], repeats)
+    works = [partial(distribute_batch, W, w, low, high, method, threads=1) for method in COMPARED]
+    seconds = interleaved([partial(processor_seconds, work) for work in works], repeats)
     costs = dict(zip(COMPARED, (1e6 * time / len(W) for time in seconds), strict=True))
-    row: dict[str, Any] = {"solved": {}, "wrong": {}, "pushing": {}}
-    for method in COMPARED:
-        pairs = [(problem, distribute(problem, method)) for problem in problems]
-        solved = [(p, s.tensions) for p, s in pairs if s.status == TensionStatus.FEASIBLE]
-        row["solved"][method] = len(solved)
-        row["wrong"][method] = sum(not holds(*pair) for pair in solved)
-        row["pushing"][method] = sum(bool(np.any(s.tensions < 0.0)) for _, s in pairs)
-    return {"poses": len(problems), **row, "cost_us": costs}
+    found = []
+    for method, problem in product(COMPARED, problems):
+        solution = distribute(problem, method)
+        t, solved = solution.tensions, solution.status == TensionStatus.FEASIBLE
+        wrong, pushing = solved and not holds(problem, t), bool(np.any(t < 0.0))
+        found.append({"method": method, "solved": solved, "wrong": wrong, "pushing": pushing})
+    counts = Frame(found).groupby("method", sort=False).sum()
+    return {"poses": len(problems), **counts.to_dict(), "cost_us": costs}
 
 
 def holds(problem: TensionProblem, t: Array) -> bool:
