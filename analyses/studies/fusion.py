@@ -46,7 +46,7 @@ RATE = 25.0
 SETTLED = 0.5
 """Time after which errors count [s]: the error of the start is corrected within it."""
 
-TARGET = {"position": 0.01, "rotation_deg": 1.0}
+TARGET = "{position: 0.01, rotation_deg: 1.0}"
 """How well the target's pose is known beforehand, as a camera in the world does not see it."""
 
 ON_BOARD = ("estimator.sensor_fusion.external=false",)
@@ -78,52 +78,48 @@ def fault(camera: str, kind: str, duration: float = 3.0) -> tuple[str, ...]:
     return (f"{camera}.fault={{kind: {kind}, start: 2.0, duration: {duration}}}",)
 
 
-SERVO_CAMERA, WORLD_CAMERA = "camera", "estimator.platform_tag"
+ON_BOARD_DEAD, EXTERNAL_DEAD = fault("camera", "dead"), fault("estimator.platform_tag", "dead")
 
 CONFIGURATIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "on_board": ("camera on board", ON_BOARD),
     "external": ("camera in the world", EXTERNAL),
     "both": ("both", ()),
-    "on_board covered": (
-        "on board, covered for 3 s", (*ON_BOARD, *fault(SERVO_CAMERA, "dead")),
+    "on_board covered": ("on board, covered for 3 s", ON_BOARD + ON_BOARD_DEAD),
+    "external covered": ("in the world, covered for 3 s", EXTERNAL + EXTERNAL_DEAD),
+    "both, on_board covered": ("both, on board covered", ON_BOARD_DEAD),
+    "both, external covered": ("both, in the world covered", EXTERNAL_DEAD),
+    "both, on_board frozen": ("both, on board frozen", fault("camera", "frozen")),
+    "both, external off": (
+        "both, in the world off by 3 cm", fault("estimator.platform_tag", "off"),
     ),
-    "external covered": (
-        "in the world, covered for 3 s", (*EXTERNAL, *fault(WORLD_CAMERA, "dead")),
-    ),
-    "both, on_board covered": ("both, on board covered", fault(SERVO_CAMERA, "dead")),
-    "both, external covered": ("both, in the world covered", fault(WORLD_CAMERA, "dead")),
-    "both, on_board frozen": ("both, on board frozen", fault(SERVO_CAMERA, "frozen")),
-    "both, external off": ("both, in the world off by 3 cm", fault(WORLD_CAMERA, "off")),
-    "on_board wrong": ("on board, 2 cm and 1 deg wrong", (*ON_BOARD, *ON_BOARD_WRONG)),
-    "external wrong": ("in the world, 2 cm and 1 deg wrong", (*EXTERNAL, *EXTERNAL_WRONG)),
+    "on_board wrong": ("on board, 2 cm and 1 deg wrong", ON_BOARD + ON_BOARD_WRONG),
+    "external wrong": ("in the world, 2 cm and 1 deg wrong", EXTERNAL + EXTERNAL_WRONG),
     "both, on_board wrong": ("both, on board wrong", ON_BOARD_WRONG),
     "both, external wrong": ("both, in the world wrong", EXTERNAL_WRONG),
-    "both, external wrong, no gates": (
-        "the same, nothing left out", (*EXTERNAL_WRONG, *NO_GATES),
-    ),
+    "both, external wrong, no gates": ("the same, nothing left out", EXTERNAL_WRONG + NO_GATES),
     "both, external knocked": ("both, in the world knocked after 3 s", KNOCKED),
     "both, doubted": ("both, doubted", DOUBTED),
     "both, on_board wrong, told": (
-        "both, on board wrong, as told", (*ON_BOARD_WRONG, *ON_BOARD_TOLD),
+        "both, on board wrong, as told", ON_BOARD_WRONG + ON_BOARD_TOLD,
     ),
     "both, external wrong, told": (
-        "both, in the world wrong, as told", (*EXTERNAL_WRONG, *EXTERNAL_TOLD),
+        "both, in the world wrong, as told", EXTERNAL_WRONG + EXTERNAL_TOLD,
     ),
     "both, external wrong, doubted": (
-        "both, in the world wrong, both doubted", (*EXTERNAL_WRONG, *DOUBTED),
+        "both, in the world wrong, both doubted", EXTERNAL_WRONG + DOUBTED,
     ),
     "both, external wrong, told, on_board covered": (
         "both, in the world wrong, as told, on board covered",
-        (*EXTERNAL_WRONG, *EXTERNAL_TOLD, *fault(SERVO_CAMERA, "dead", 1000.0)),
+        EXTERNAL_WRONG + EXTERNAL_TOLD + fault("camera", "dead", 1000.0),
     ),
     "both, external knocked, doubted": (
-        "both, in the world knocked, both doubted", (*KNOCKED, *DOUBTED),
+        "both, in the world knocked, both doubted", KNOCKED + DOUBTED,
     ),
     "both, imu": ("both and an IMU", IMU),
     "both, depth": ("both and depths", DEPTH),
-    "external, imu": ("in the world and an IMU", (*EXTERNAL, *IMU)),
-    "external, depth": ("in the world and depths", (*EXTERNAL, *DEPTH)),
-    "all": ("both, an IMU and depths", (*IMU, *DEPTH)),
+    "external, imu": ("in the world and an IMU", EXTERNAL + IMU),
+    "external, depth": ("in the world and depths", EXTERNAL + DEPTH),
+    "all": ("both, an IMU and depths", IMU + DEPTH),
 }  # fmt: skip
 """Words and changes of the scenario by name; encoders and tension sensors are read by each."""
 
@@ -139,12 +135,11 @@ def servo_scenario(changes: Sequence[str], duration: float, seed: int) -> Scenar
         duration: How long it runs [s].
         seed: By which it is drawn.
     """
-    target = f"{{position: {TARGET['position']}, rotation_deg: {TARGET['rotation_deg']}}}"
     base = [
         "camera.fault=null", "perturbations={}", "estimator.compare=[]", "stop.hold=1000",
         "stop.target_lost=1000", "integration.engine=compiled", f"log_rate={RATE}",
         f"duration={duration}", f"seed={seed}",
-        f"estimator.sensor_fusion.told_object={target}",
+        f"estimator.sensor_fusion.told_object={TARGET}",
     ]  # fmt: skip
     scenario = load_scenario(SCENARIO, base)
     filter_, random = scenario.estimator.sensor_fusion, np.random.default_rng([seed, 31])
@@ -191,6 +186,7 @@ def servo_row(changes: Sequence[str], duration: float, seed: int) -> dict[str, A
         for row, time in zip(log["X_WP"], times, strict=True)
     ])  # fmt: skip
     nees = normalized_errors(log)
+    curves = Frame({"estimate_m": distance, "target_m": target[:, 0], "nees_by_row": nees})
     later = times >= min(SETTLED, 0.5 * duration)
     sources = log["fusion_sources"][later]
     stopped = np.linalg.norm(log["cable_velocities"][later], axis=1) == 0.0
@@ -209,8 +205,7 @@ def servo_row(changes: Sequence[str], duration: float, seed: int) -> dict[str, A
         "external_left_out": np.mean(sources[:, 1] < 0.0), "lost_s": np.sum(stopped) / RATE,
         "expected_m": np.sqrt(np.trace(log["fusion_covariance"][-1].reshape(6, 6)[3:, 3:])),
         "wrong_on_board": wrong[0], "wrong_external": wrong[1], "nis": means.tolist(),
-        "estimate_m": _padded(distance, count), "target_m": _padded(target[:, 0], count),
-        "nees_by_row": _padded(nees, count),
+        **{name: values.to_numpy() for name, values in curves.reindex(range(count)).items()},
     }  # fmt: skip
 
 
@@ -222,11 +217,6 @@ def normalized_errors(log: Mapping[str, Array]) -> Array:
         error = logarithm(X_WE.inverse() @ X_WP)
         nees[k] = error @ np.linalg.solve(log["fusion_covariance"][k].reshape(6, 6), error)
     return nees
-
-
-def _padded(values: Array, count: int) -> Array:
-    """So many values, NaN where there are none."""
-    return np.concatenate([values[:count], np.full(max(count - len(values), 0), np.nan)])
 
 
 # Starts with slack cables.
@@ -303,10 +293,9 @@ def image_errors(result: RunResult, seed: int) -> Array:
         points=POINTS, noise=NOISE, seed=seed,
     )  # fmt: skip
     errors = list[float]()
-    for k, surplus in enumerate(log["surplus_lengths"][:, CABLES]):
-        if not np.any(surplus > TAUT):
-            continue
-        pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], k)
+    surpluses = log["surplus_lengths"][:, CABLES]
+    for k in np.flatnonzero(np.any(surpluses > TAUT, axis=1)):
+        pixels = camera.look(pose_from_row(log["X_WP"][k]), log["unstrained_lengths"][k], int(k))
         try:
             image = slack_from_image(
                 pixels.reshape(len(robot.cables), 2, -1), cables,
@@ -314,7 +303,7 @@ def image_errors(result: RunResult, seed: int) -> Array:
             )  # fmt: skip
         except CableGeometryError:
             continue
-        errors += (image.surplus[CABLES] - surplus)[surplus > TAUT].tolist()
+        errors += (image.surplus[CABLES] - surpluses[k])[surpluses[k] > TAUT].tolist()
     return np.array(errors)
 
 
@@ -342,22 +331,22 @@ def both_as_good_as_the_better(rows: Frame) -> tuple[list[bool], str]:
     is told, but does not count: with more readings it always expects less.
     """
     runs = {name: select(rows, configuration=name) for name in THREE}
-    errors = {name: mine["mean_m"].to_numpy() for name, mine in runs.items()}
-    if len(errors["both"]) < 2:
+    errors = Frame({name: mine["mean_m"].to_numpy() for name, mine in runs.items()})
+    if len(errors) < 2:
         raise MissingRuns("a second seed, as one has no spread")
-    better = min(THREE[:2], key=lambda name: float(np.mean(errors[name])))
-    more = errors["both"] - errors[better]
-    mean, chance = float(np.mean(more)), 2.0 * float(np.std(more, ddof=1)) / np.sqrt(len(more))
-    luckier = errors["both"] / np.minimum(errors["on_board"], errors["external"])
+    cameras = errors[["on_board", "external"]]
+    more = errors["both"] - errors[cameras.mean().idxmin()]
+    mean, chance = more.mean(), 2.0 * more.std() / np.sqrt(len(more))
+    luckier = errors["both"] / cameras.min(axis=1)
     means = ", ".join(
         f"{name} {1e3 * np.mean(errors[name]):.1f} mm (expected "
         f"{1e3 * mine['expected_m'].mean():.1f} mm)"
         for name, mine in runs.items()
     )
-    return [mean <= 0.0, mean <= chance], (
+    return [bool(mean <= 0.0), bool(mean <= chance)], (
         f"mean error of the pose over {len(more)} seeds: {means}; both less the better one "
         f"{1e3 * mean:+.1f} mm, by chance up to {1e3 * chance:.1f}; over the luckier one of each "
-        f"seed {np.median(luckier):.2f} (median), {np.max(luckier):.2f} at most"
+        f"seed {luckier.median():.2f} (median), {luckier.max():.2f} at most"
     )
 
 
@@ -403,56 +392,41 @@ def slack_table(rows: Frame) -> Frame:
 def figure(rows: Frame) -> Figure:
     """Errors of the estimate in time and of every configuration, consistency."""
     servos = rows[rows["trial"] == SERVO]
-    covered = ("on_board covered", "both, on_board covered", "both, external covered")
     drawn, axes = new_figure(2, 2, (15.0, 11.0), "Two cameras, lengths, an IMU and depths, fused")
-    _draw_means(axes[0, 0], servos, THREE, "estimate_m", 1e3)
-    axes[0, 0].set_title("pose estimate, mean over seeds")
-    if servos["configuration"].isin(covered).any():
-        _draw_means(axes[0, 1], servos, covered, "estimate_m", 1e3)
-        axes[0, 1].axvspan(2.0, 5.0, color=SHADED.color, linewidth=0.0)
-        axes[0, 1].set_title("a camera covered from 2 to 5 s")
+    estimates, covered, errors, consistency = axes.flat
+    apart = "distance from the true pose [mm]"
+    names = ("on_board covered", "both, on_board covered", "both, external covered")
+    for panel, configurations, curve, scale, ylabel, title in (
+        (estimates, THREE, "estimate_m", 1e3, apart, "pose estimate, mean over seeds"),
+        (covered, names, "estimate_m", 1e3, apart, "a camera covered from 2 to 5 s"),
+        (consistency, THREE, "nees_by_row", 1.0, "normalized error squared [-]", "consistency"),
+    ):
+        for number, name in enumerate(configurations):
+            runs = servos[servos["configuration"] == name]
+            if len(runs):
+                values = scale * np.mean([arrays[curve] for arrays in runs["arrays"]], axis=0)
+                panel.plot(np.arange(len(values)) / RATE, values, label=runs["sources"].iloc[0],
+                           **line_style(nth_look(number)))  # fmt: skip
+        panel.set(xlabel="time [s]", ylabel=ylabel, title=title)
+    consistency.axhline(6.0, label="as uncertain as wrong", **line_style(BOUND))
+    consistency.margins(y=0.1)
+    if covered.lines:
+        covered.axvspan(2.0, 5.0, color=SHADED.color, linewidth=0.0)
     else:
-        axes[0, 1].remove()
-    for panel in axes[0]:
-        panel.set(xlabel="time [s]", ylabel="distance from the true pose [mm]")
-    _draw_bars(axes[1, 0], servos)
-    _draw_means(axes[1, 1], servos, THREE, "nees_by_row")
-    axes[1, 1].axhline(6.0, label="as uncertain as wrong", **line_style(BOUND))
-    axes[1, 1].margins(y=0.1)
-    axes[1, 1].set(xlabel="time [s]", ylabel="normalized error squared [-]", title="consistency")
-    for panel in (axes[0, 0], axes[0, 1], axes[1, 1]):
-        panel.set_ylim(bottom=0.0)
-        if panel.get_legend_handles_labels()[0]:
-            panel.legend(loc="best")
+        covered.remove()
+    means = servos.groupby("sources", sort=False)["mean_m"].mean()
+    errors.barh(range(len(means)), 1e3 * means, 0.6, label="mean", **bar_style(nth_look(0)))
+    errors.plot(1e3 * servos["largest_m"], servos["sources"].map(means.index.get_loc), "x",
+                color=nth_look(7).color, label="largest, each run")  # fmt: skip
+    errors.set_yticks(range(len(means)), means.index, fontsize=8)
+    errors.invert_yaxis()
+    errors.set(xlabel="distance of the estimate from the true pose [mm]",
+               title="all configurations")  # fmt: skip
+    for panel in drawn.axes:
+        if panel is not errors:
+            panel.set_ylim(bottom=0.0)
+        panel.legend(loc="best")
     return drawn
-
-
-def _draw_means(
-    axes: Any, rows: Frame, names: Sequence[str], curve: str, scale: float = 1.0
-) -> None:
-    """Means of curves over seeds in time."""
-    for number, name in enumerate(names):
-        runs = rows[rows["configuration"] == name]
-        if len(runs):
-            values = scale * np.mean([arrays[curve] for arrays in runs["arrays"]], axis=0)
-            axes.plot(np.arange(len(values)) / RATE, values, label=runs["sources"].iloc[0],
-                      **line_style(nth_look(number)))  # fmt: skip
-
-
-def _draw_bars(axes: Any, rows: Frame) -> None:
-    """Mean errors of the estimate of every configuration, and the largest of each run."""
-    groups = dict([*rows.groupby("sources", sort=False)])
-    for place, runs in enumerate(groups.values()):
-        first = place == 0
-        axes.barh(place, 1e3 * runs["mean_m"].mean(), 0.6, label="mean" if first else None,
-                  **bar_style(nth_look(0)))  # fmt: skip
-        axes.plot(1e3 * runs["largest_m"], np.full(len(runs), place), linestyle="", marker="x",
-                  color=nth_look(7).color,
-                  label="largest, each run" if first else None)  # fmt: skip
-    axes.set_yticks(range(len(groups)), list(groups), fontsize=8)
-    axes.invert_yaxis()
-    axes.set(xlabel="distance of the estimate from the true pose [mm]", title="all configurations")
-    axes.legend(loc="best")
 
 
 STUDY = Study(

@@ -13,7 +13,6 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
@@ -146,7 +145,8 @@ def turn_row(scheme: str, turn_deg: float) -> dict[str, Any]:
 def free_row(scheme: str, seed: int) -> dict[str, Any]:
     """A drawn start of a free camera, see `FreeCamera.run`; without depths and dots."""
     row = FreeCamera(scheme).run(free_starts(seed + 1)[seed], bounded=True)
-    return {name: value for name, value in row.items() if name not in ("depths_m", "dots_px")}
+    del row["depths_m"], row["dots_px"]
+    return row
 
 
 def robot_row(scheme: str, seed: int) -> dict[str, Any]:
@@ -157,11 +157,10 @@ def robot_row(scheme: str, seed: int) -> dict[str, Any]:
         servo.X_CO(pose_from_row(row), time)
         for row, time in zip(log["X_WP"], log["time"], strict=True)
     ]
-    assert isinstance(servo.target, PointTarget)
-    row = measured(poses, servo.X_CdO, servo.target, servo.pinhole)
-    del row["depths_m"], row["dots_px"]
     arrived, lost = run.outcome == Outcome.CONVERGED, run.outcome == Outcome.TARGET_LOST
-    return _ended(row, arrived, lost, run.sim_time, log.get("servo_mode"))
+    row = ended(arrived, lost, run.sim_time, log.get("servo_mode"), measured(poses))
+    del row["depths_m"], row["dots_px"]
+    return row
 
 
 def robot_changes(scheme: str, number: int) -> list[str]:
@@ -181,15 +180,14 @@ class FreeCamera:
 
     def __init__(self, variant: str) -> None:
         """For one of `VARIANTS`, with the law that the scenario's settings give."""
-        self.scenario: Scenario = load_scenario(SCENARIO, [*VARIANTS[variant], *LAW])
-        self.target, self.pinhole = target_and_camera(self.scenario)
-        model = servo_model(self.scenario, load_robot(self.scenario.robot))
+        scenario: Scenario = load_scenario(SCENARIO, [*VARIANTS[variant], *LAW])
+        model = servo_model(scenario, load_robot(scenario.robot))
         # A platform that is its camera, whose cables are never too fast.
         believed = replace(model.believed, X_PC=RigidTransform(), cable_speed=np.inf)
+        _, self.target, self.pinhole, self.X_CdO = scene()
         self.controller: ServoController = make_controller(
-            self.scenario, believed, self.target, self.pinhole
+            scenario, believed, self.target, self.pinhole
         )
-        self.X_CdO: RigidTransform = self.scenario.desired.transform()
 
     def run(self, X_CO: RigidTransform, bounded: bool) -> dict[str, Any]:
         """Its motion from a start.
@@ -207,37 +205,31 @@ class FreeCamera:
             (n, 2, 4). Times and paths of runs that did not arrive are NaN.
         """
         servo, memory = self.controller, self.controller.fresh_memory()
+        target, pinhole = self.target, self.pinhole
         poses, modes, lost = [X_CO], [], False
         for k in range(round(FREE_TIME / PERIOD)):
-            if np.min((X_CO @ self.target.points)[2]) <= 0.0 or (
-                bounded and not self.target.in_view(X_CO, self.pinhole)
-            ):
-                lost = True
+            p_CK = X_CO @ target.points
+            lost = np.min(p_CK[2]) <= 0.0 or (bounded and not target.in_view(X_CO, pinhole))
+            if lost:
                 break
-            marks = self.pinhole.project(X_CO @ self.target.points).T.ravel()
+            seen = (X_CO, pinhole.project(p_CK).T.ravel())
             command, memory = control_step(
-                servo, memory, (self.target, self.pinhole), (X_CO, marks), RigidTransform(),
-                k * PERIOD,
-            )  # fmt: skip
+                servo, memory, (target, pinhole), seen, RigidTransform(), k * PERIOD
+            )
             modes.append(servo.mode(memory))
             X_CO = exponential(-PERIOD * command.V_P) @ X_CO
             poses.append(X_CO)
-        at_goal = [_is_at_goal(X, self.X_CdO) for X in poses]
-        first = len(at_goal) - at_goal[::-1].index(False) if False in at_goal else 0
+        errors = np.array([seen_pose_error(X, self.X_CdO) for X in poses])
+        at_goal = np.all(errors <= [ARRIVED_DISTANCE, np.radians(ARRIVED_ANGLE)], axis=1)
+        first = len(at_goal) - np.argmin(at_goal[::-1]) if not np.all(at_goal) else 0
         mode = np.array(modes) if servo.law.switching is not None else None
-        row = measured(poses, self.X_CdO, self.target, self.pinhole)
-        return _ended(row, not lost and at_goal[-1], lost, first * PERIOD, mode)
+        arrived = bool(at_goal[-1]) and not lost
+        return ended(arrived, lost, float(first * PERIOD), mode, measured(poses))
 
 
-def _is_at_goal(X_CO: RigidTransform, X_CdO: RigidTransform) -> bool:
-    distance, angle = seen_pose_error(X_CO, X_CdO)
-    return distance <= ARRIVED_DISTANCE and angle <= np.radians(ARRIVED_ANGLE)
-
-
-def measured(
-    poses: Sequence[RigidTransform], X_CdO: RigidTransform, target: PointTarget, pinhole: Pinhole
-) -> dict[str, Any]:
+def measured(poses: Sequence[RigidTransform]) -> dict[str, Any]:
     """Path in the image, retreat, room to the edges, depths, dots; see `FreeCamera.run`."""
+    _, target, pinhole, X_CdO = scene()
     depths = np.array([X.translation()[2] for X in poses])
     p_CK = np.array([X @ target.points for X in poses])
     in_front = np.maximum(p_CK[:, 2:], 1e-6)
@@ -254,40 +246,41 @@ def measured(
     }  # fmt: skip
 
 
-def _ended(
-    row: dict[str, Any], arrived: bool, lost: bool, time: float, mode: Array | None
+def ended(
+    arrived: bool, lost: bool, time: float, mode: Array | None, row: Mapping[str, Any]
 ) -> dict[str, Any]:
     """A row with how its run ended; without times and paths of one that did not arrive."""
     switches = share = np.nan
     if mode is not None and len(mode):
         switches, acting = float(mode[-1, 1]), mode[mode[:, 4] > 0.0]
         share = float(np.max(acting[:, 2:4] / acting[:, 4:])) if len(acting) else np.nan
-    ended = {
+    nothing = {} if arrived else {"time_s": np.nan, "image_path_px": np.nan}
+    return {
         "arrived": arrived, "lost": lost, "time_s": time, "switches": switches,
-        "bound_share": share, **row,
+        "bound_share": share, **row, **nothing,
     }  # fmt: skip
-    return ended if arrived else {**ended, "time_s": np.nan, "image_path_px": np.nan}
+
+
+@cache
+def scene() -> tuple[Scenario, PointTarget, Pinhole, RigidTransform]:
+    """The scenario with the law of all schemes, its dots, its camera, and X_CO at the goal."""
+    scenario: Scenario = load_scenario(SCENARIO, list(LAW))
+    target = scenario.target.target()
+    assert isinstance(target, PointTarget)
+    pinhole = servo_model(scenario, load_robot(scenario.robot)).pinhole
+    return scenario, target, pinhole, scenario.desired.transform()
 
 
 def turned(angle: float) -> RigidTransform:
     """The dots in a camera that is turned about its axis from the desired pose [deg]."""
-    X_CdO = load_scenario(SCENARIO, list(LAW)).desired.transform()
-    return pose_from_angles(np.zeros(3), np.radians([0.0, 0.0, angle])) @ X_CdO
-
-
-def target_and_camera(scenario: Scenario) -> tuple[PointTarget, Pinhole]:
-    """Target and camera of a scenario."""
-    target = scenario.target.target()
-    assert isinstance(target, PointTarget)
-    return target, servo_model(scenario, load_robot(scenario.robot)).pinhole
+    return pose_from_angles(np.zeros(3), np.radians([0.0, 0.0, angle])) @ scene()[-1]
 
 
 @cache
 def free_starts(count: int) -> tuple[RigidTransform, ...]:
     """The first starts of a free camera, which see all dots; the same for all schemes."""
-    scenario = load_scenario(SCENARIO, list(LAW))
-    target, pinhole = target_and_camera(scenario)
-    goal, random = scenario.desired.transform().rotation(), np.random.default_rng(SEED)
+    _, target, pinhole, X_CdO = scene()
+    random = np.random.default_rng(SEED)
     starts: list[RigidTransform] = []
     half = np.array([0.5 * pinhole.width / pinhole.fx, 0.5 * pinhole.height / pinhole.fy])
     while len(starts) < count:
@@ -295,7 +288,7 @@ def free_starts(count: int) -> tuple[RigidTransform, ...]:
         x, y = depth * half * random.uniform(-1.0, 1.0, 2)
         tilt = random.uniform(-TILT, TILT, 2)
         turn = pose_from_angles(np.zeros(3), np.radians([*tilt, random.uniform(-TURN, TURN)]))
-        X_CO = RigidTransform(turn.rotation() @ goal, [x, y, depth])
+        X_CO = RigidTransform(turn.rotation() @ X_CdO.rotation(), [x, y, depth])
         if target.in_view(X_CO, pinhole):
             starts.append(X_CO)
     return tuple(starts)
@@ -305,8 +298,7 @@ def free_starts(count: int) -> tuple[RigidTransform, ...]:
 def robot_starts(count: int) -> tuple[tuple[list[float], list[float], float], ...]:
     """The first starts of ACROBOT, position [m], angles [deg], and the dots' yaw [deg], from which
     the camera would see all dots; the same for all schemes."""
-    scenario = load_scenario(SCENARIO, list(LAW))
-    target, pinhole = target_and_camera(scenario)
+    scenario, target, pinhole, _ = scene()
     X_PC = load_robot(scenario.robot).camera_mount(scenario.camera.mount).pose.transform()
     random = np.random.default_rng(SEED + 1)
     starts: list[tuple[list[float], list[float], float]] = []
@@ -330,8 +322,6 @@ DRAWN = ("ibvs", "pbvs-line", "partitioned", "partitioned, turned", "switching")
 NOTHING = 1e-5
 """Retreat that is drawn where there is none, or less [m]."""
 
-LOOKS = {scheme: nth_look(k) for k, scheme in enumerate(VARIANTS)}
-
 
 def table(trial: str, rows: Frame) -> Frame:
     """Medians of the runs that arrived, worst of all."""
@@ -351,51 +341,34 @@ def _switched(switches: Any) -> float:
 def figure(rows: Frame) -> Figure:
     """Retreats and depths on turns, failures from drawn starts."""
     drawn, axes = new_figure(2, 2, (14.0, 10.0), "Schemes of visual servoing")
-    turns = rows[rows["trial"] == TURNS]
-    shown = {scheme: turns[turns["scheme"] == scheme] for scheme in DRAWN}
-    _draw_retreats(axes[0, 0], shown)
-    _draw_largest_turn(axes[0, 1], shown)
-    for axis, trial in ((axes[1, 0], FREE), (axes[1, 1], ROBOT)):
-        _draw_failures(axis, rows[rows["trial"] == trial], trial)
-    return drawn
-
-
-def _draw_retreats(axis: Axes, shown: Mapping[str, Frame]) -> None:
-    """How far the camera retreats on a turn, by its angle."""
-    for scheme, turns in shown.items():
-        look = LOOKS[scheme]
-        axis.semilogy(turns["turn_deg"], turns["retreat_m"].clip(lower=NOTHING), label=scheme,
-                      marker=look.marker, markersize=4, **line_style(look))  # fmt: skip
-    axis.set(xlabel="turn about the optical axis [deg]",
-             ylabel=f"retreat [m]; at $10^{{{np.log10(NOTHING):.0f}}}$: none",
-             title="How much farther than start and goal the camera goes")  # fmt: skip
-    axis.legend()
-
-
-def _draw_largest_turn(axis: Axes, shown: Mapping[str, Frame]) -> None:
-    """Depth over time on the largest turn."""
-    for scheme, turns in shown.items():
+    retreats, depths, *failures = axes.flat
+    looks = {scheme: nth_look(k) for k, scheme in enumerate(VARIANTS)}
+    for scheme in DRAWN:
+        look, turns = looks[scheme], rows[(rows["trial"] == TURNS) & (rows["scheme"] == scheme)]
+        retreats.semilogy(turns["turn_deg"], turns["retreat_m"].clip(lower=NOTHING), label=scheme,
+                          marker=look.marker, markersize=4, **line_style(look))  # fmt: skip
         for arrays in turns["arrays"][turns["turn_deg"] == TURNS_DEG[-1]]:
-            depths = arrays["depths_m"]
-            times = PERIOD * np.arange(len(depths))
-            axis.semilogy(times, depths, label=scheme, **line_style(LOOKS[scheme]))
-    axis.set(xlabel="time [s]", ylabel="depth of the dots [m]", ylim=(0.03, 10.0),
-             title=f"A turn by {TURNS_DEG[-1]} deg")  # fmt: skip
-
-
-def _draw_failures(axis: Axes, rows: Frame, trial: str) -> None:
-    """Shares of runs that lost the target or did not arrive, side by side."""
-    shares = rows.groupby("scheme", sort=False)[["lost", "arrived"]].mean()
-    for place, (scheme, lost, arrived) in enumerate(shares.itertuples()):
-        gone, short = 100.0 * lost, 100.0 * (1.0 - arrived - lost)
-        axis.bar(place, gone, color=LOOKS[scheme].color, edgecolor="black")
-        axis.bar(place, short, bottom=gone, color="white", edgecolor="black", hatch="//")
-        axis.annotate(f"{gone:.0f} + {short:.0f}", (place, gone + short), ha="center",
-                      va="bottom")  # fmt: skip
-    axis.set_xticks(range(len(shares)), shares.index, rotation=30, ha="right",
-                    rotation_mode="anchor")  # fmt: skip
-    axis.set(ylabel="runs [%]", title=f"{trial}: target lost (full) + not there (hatched)")
-    axis.set_ylim(0.0, max(5.0, 1.2 * axis.get_ylim()[1]))
+            values = arrays["depths_m"]
+            times = PERIOD * np.arange(len(values))
+            depths.semilogy(times, values, label=scheme, **line_style(look))
+    retreats.set(xlabel="turn about the optical axis [deg]",
+                 ylabel=f"retreat [m]; at $10^{{{np.log10(NOTHING):.0f}}}$: none",
+                 title="How much farther than start and goal the camera goes")  # fmt: skip
+    retreats.legend()
+    depths.set(xlabel="time [s]", ylabel="depth of the dots [m]", ylim=(0.03, 10.0),
+               title=f"A turn by {TURNS_DEG[-1]} deg")  # fmt: skip
+    for axis, trial in zip(failures, (FREE, ROBOT), strict=True):
+        runs = rows[rows["trial"] == trial].groupby("scheme", sort=False)
+        shares = runs[["lost", "arrived"]].mean()
+        places, colors = range(len(shares)), [looks[scheme].color for scheme in shares.index]
+        lost, short = 100.0 * shares["lost"], 100.0 * (1.0 - shares["arrived"] - shares["lost"])
+        axis.bar(places, lost, color=colors, edgecolor="black")
+        bars = axis.bar(places, short, bottom=lost, color="white", edgecolor="black", hatch="//")
+        axis.bar_label(bars, [f"{a:.0f} + {b:.0f}" for a, b in zip(lost, short, strict=True)])
+        axis.set_xticks(places, shares.index, rotation=30, ha="right", rotation_mode="anchor")
+        axis.set(ylabel="runs [%]", title=f"{trial}: target lost (full) + not there (hatched)")
+        axis.set_ylim(0.0, max(5.0, 1.2 * axis.get_ylim()[1]))
+    return drawn
 
 
 STUDY = Study(

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.studies import tension_trials as tt
-from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.control.force_balance import FORCE, WRENCH
@@ -35,7 +34,7 @@ DRAWN = 2e4
 """Larger tensions, of platforms that are lost, are drawn as this [N]."""
 
 DASHES = {tt.Applied.HELD: SOLID, tt.Applied.CUT: DOTTED, tt.Applied.PUSHED: DASHED}
-GAINS = tuple(sorted({gain for gains in tt.THESIS_GAINS.values() for gain in gains}))
+GAINS = tt.THESIS_GAINS["quadratic_program"]
 """All gains Kp of the study, each with its colour and marker in all figures [1/s^2]."""
 
 
@@ -61,24 +60,12 @@ def parameters(form: Form) -> Mapping[str, Any]:
         "integration_step_s": tt.STEP, "mass_kg": robot.platform.mass,
         "tension_bounds_n": robot.tension_limits(), "printed_start_m": tt.THESIS_START,
         "printed_end_m": tt.THESIS_END, "printed_places_are": "of the middle of the platform",
-        "start_m": path.start, "end_m": path.end,
+        "start_m": path.ends[0], "end_m": path.ends[1],
         "start_and_end_are": "of P, the middle of the bottom face",
-        "start_least_shift_m": path.start_limit, "end_least_shift_m": path.end_limit,
-        "start_shift_m": path.start_shift, "end_shift_m": path.end_shift,
+        "start_least_shift_m": path.limits[0], "end_least_shift_m": path.limits[1],
+        "start_shift_m": path.shifts[0], "end_shift_m": path.shifts[1],
         "grid": tt.QUICK_GRID if form.quick else tt.GRID, "grid_angles_deg": tt.TURNS_DEG,
     }  # fmt: skip
-
-
-def some(rows: Frame, **where: Any) -> Frame:
-    """Rows with these values.
-
-    Raises:
-        MissingRuns: There are none.
-    """
-    for column, value in where.items():
-        if column not in rows or not len(rows := rows[rows[column] == value]):
-            raise MissingRuns(f"{column} {value}")
-    return rows
 
 
 def near_instability(rows: Frame) -> tuple[list[bool], str]:
@@ -88,18 +75,17 @@ def near_instability(rows: Frame) -> tuple[list[bool], str]:
     """
 
     def row(experiment: str, method: str, gain: float) -> Any:
-        found = some(rows, experiment=experiment, method=method, kp_per_s2=gain, applied="held")
+        found = select(rows, experiment=experiment, method=method, kp_per_s2=gain, applied="held")
         return found.iloc[0]
+
+    def fails(one: Any) -> bool:
+        return bool(one["lost"] or one["failures"] > 0)
 
     calm = row("thesis", "quadratic_program", 100.0)["position_error_max_m"]
     named = [row("thesis", "linear_program", 1200.0), row("thesis", "quadratic_program", 1500.0)]
-    slow = [row("slow", "quadratic_program", gain) for gain in GAINS]
     far = row("far_step", "quadratic_program", 1200.0)
-    bad = [f"{one['kp_per_s2']:g}" for one in slow if one["lost"] or one["failures"] > 0]
-    held = [
-        bool(one["lost"] or one["failures"] > 0 or one["position_error_max_m"] > calm)
-        for one in named
-    ]
+    bad = [f"{gain:g}" for gain in GAINS if fails(row("slow", "quadratic_program", gain))]
+    held = [fails(one) or bool(one["position_error_max_m"] > calm) for one in named]
     errors = ", ".join(f"{1e6 * one['position_error_max_m']:.3g}" for one in named)
     return held if all(held) else [*held, bool(far["lost"] or bad)], (
         f"at 1 kHz largest errors {errors} um, at gain 100 {1e6 * calm:.3g} um; from 50 mm beside "
@@ -109,33 +95,26 @@ def near_instability(rows: Frame) -> tuple[list[bool], str]:
     )
 
 
-def met(rows: Frame, **where: Any) -> dict[str, Any]:
-    """Largest tensions by method, and how many of the twelve printed ones they meet."""
-    sizes = {
-        method: [float(some(rows, method=method, kp_per_s2=gain, **where)["tension_max_n"].iloc[0])
-                 for gain in tt.GAINS]
-        for method in tt.PRINTED
-    }  # fmt: skip
-    good = [
-        b / 2.0 <= a <= 2.0 * b
-        for m, v in tt.PRINTED.items()
-        for a, b in zip(sizes[m], v, strict=True)
-    ]
-    words = {m.replace("_", " "): ", ".join(f"{one:.3g}" for one in v) for m, v in sizes.items()}
-    return {**where, "met of 12": sum(good), **words}
-
-
 def settings_tried(rows: Frame) -> Frame:
-    """What could make tensions as large as the printed ones, and how many each setting meets."""
-    starts: list[dict[str, Any]] = [
+    """What could make tensions as large as the printed ones: the largest by setting and method, and
+    how many of the twelve printed ones they meet."""
+    settings: list[dict[str, Any]] = [
         {"experiment": tt.START_ERROR, "start": start, "balance": balance, "control_rate_hz": rate}
         for start, rate, balance in product(tt.STARTS, tt.RATES, (WRENCH, FORCE))
-    ]
-    pulses: list[dict[str, Any]] = [
+    ] + [
         {"experiment": tt.ONE_STEP, "start": start, "between": between}
         for start, between in product((tt.LAUNCH, tt.ON_PATH), (tt.STATIC, tt.NOTHING))
     ]
-    return Frame([met(rows, **where) for where in (*starts, *pulses)])
+    printed, found = np.array([*tt.PRINTED.values()]), []
+    for where in settings:
+        mine = select(rows, **where)
+        wide = mine.pivot(index="method", columns="kp_per_s2", values="tension_max_n")
+        sizes = wide.loc[[*tt.PRINTED], [*tt.GAINS]].to_numpy(float)
+        met = (printed / 2.0 <= sizes) & (sizes <= 2.0 * printed)
+        words = [", ".join(f"{size:.3g}" for size in some) for some in sizes]
+        methods = dict(zip(map(words_of, tt.PRINTED), words, strict=True))
+        found.append({**where, "met of 12": met.sum(), **methods})
+    return Frame(found)
 
 
 def run_table(name: str, rows: Frame) -> Frame:
@@ -147,19 +126,19 @@ def run_table(name: str, rows: Frame) -> Frame:
         "tension_jump_max_n": "jump [N]", "negative_tensions": "negative", "failures": "failures",
         "control_steps": "of steps", "lost": "fell", "end_time_s": "ends [s]",
     }  # fmt: skip
-    return some(rows, experiment=name)[[*columns]].rename(columns=columns)
+    return select(rows, experiment=name)[[*columns]].rename(columns=columns)
 
 
 def coverage_table(rows: Frame) -> Frame:
     """How much of each robot's grid each method solves, and its times."""
     columns = ["robot", "method", "poses", "feasible", "share", "wrong", "mean_largest_tension_n",
                "call_us", "kernel_us"]  # fmt: skip
-    return some(rows, experiment=COVERAGE)[columns]
+    return select(rows, experiment=COVERAGE)[columns]
 
 
 def start_table(name: str, rows: Frame) -> Frame:
     """Largest tensions of a start experiment, a column for each gain."""
-    mine = some(rows, experiment=name)
+    mine = select(rows, experiment=name)
     keys = ["start", "balance", "between", "method", "control_rate_hz"]
     wide = mine.pivot(index=keys, columns="kp_per_s2", values="tension_max_n")
     lost = mine.groupby(keys)["lost"].sum().rename("lost")
@@ -174,10 +153,9 @@ def words_of(name: str) -> str:
 
 def error_figure(experiment: str, rows: Frame) -> Figure:
     """Position errors over time of the runs of one experiment, a panel for each method."""
-    mine = some(rows, experiment=experiment)
+    mine = select(rows, experiment=experiment)
     methods = dict([*mine.groupby("method", sort=False)])
-    gains = sorted({*GAINS, *mine["kp_per_s2"]})
-    drawn, panels = _panels(len(methods), f"Position error, {_title(experiment)}")
+    drawn, panels = _panels(len(methods), "Position error", experiment, "error [mm]")
     for axes, (method, runs) in zip(panels, methods.items(), strict=True):
         fell = []
         for _, run in runs.iterrows():
@@ -186,39 +164,31 @@ def error_figure(experiment: str, rows: Frame) -> Figure:
                 fell.append(f"{name} fell at {run['end_time_s']:.2f} s")
             if run["lost"] and run["end_time_s"] < 0.05 * run["wanted_duration_s"]:
                 continue  # would not be seen
-            number, arrays = gains.index(run["kp_per_s2"]), run["arrays"]
+            number, arrays = GAINS.index(run["kp_per_s2"]), run["arrays"]
             look = Look(nth_look(number).color, DASHES[run["applied"]], nth_look(number).marker)
             errors = np.maximum(1e3 * arrays["errors_m"], 1e-9)
             draw_curve(axes, arrays["times_s"], errors, look, name,
-                       phase=phase_of(number, len(gains)), markersize=4.0)  # fmt: skip
+                       phase=phase_of(number, len(GAINS)), markersize=4.0)  # fmt: skip
         axes.set(yscale="log", xlim=(0.0, mine["wanted_duration_s"].max()))
         axes.set_title(words_of(method), fontsize=11)
+        lines = ["; ".join(fell[k : k + 2]) for k in range(0, len(fell), 2)]
         axes.legend(
-            handles=list(axes.lines),
-            title="\n".join("; ".join(fell[k : k + 2]) for k in range(0, len(fell), 2)),
-            title_fontsize=7,
-            fontsize=7,
-            ncols=2,
-            loc="upper center",
-            bbox_to_anchor=(0.5, 0.0),
-            borderaxespad=5.0,  # below the axes, where no curve runs
-        )
-    limits = [axes.get_ylim() for axes in panels]
-    for axes in panels:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-    _name_axes(panels, "error [mm]")
+            handles=list(axes.lines), title="\n".join(lines), title_fontsize=7, fontsize=7,
+            ncols=2, loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=5.0,
+        )  # fmt: skip
+    _same_heights(panels)
     return drawn
 
 
 def tension_figure(experiment: str, rows: Frame) -> Figure:
     """Tensions over time, of each method the lowest and the highest gain that stay up."""
-    mine = some(rows, experiment=experiment)
+    mine = select(rows, experiment=experiment)
     up = mine[~mine["lost"].astype(bool)]
     chosen: list[Any] = []
     for _, group in (up if len(up) else mine).groupby(["method", "applied"], sort=False):
         ordered = [run for _, run in group.sort_values("kp_per_s2").iterrows()]
         chosen += ordered[:1] + ordered[1:][-1:]
-    drawn, panels = _panels(len(chosen), f"Tensions, {_title(experiment)}")
+    drawn, panels = _panels(len(chosen), "Tensions", experiment, "tension [N]")
     for axes, run in zip(panels, chosen, strict=True):
         high = _draw_tensions(axes, run)
         applied = "" if run["applied"] == "held" else f", {run['applied']}"
@@ -226,12 +196,8 @@ def tension_figure(experiment: str, rows: Frame) -> Figure:
         if high <= 1.5 * float(np.max(run["arrays"]["tensions_n"], initial=0.0)):
             style = line_style(BOUND) | {"linewidth": 1.0, "zorder": 1}
             axes.axhline(high, label=f"upper bound {high:g} N", **style)
-    _name_axes(panels, "tension [N]")
-    handles: dict[str, Any] = {}
-    for axes in panels:
-        handles |= {
-            label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
+    found = [axes.get_legend_handles_labels() for axes in panels]
+    handles = {k: v for some, names in found for k, v in zip(names, some, strict=True)}
     drawn.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=5)
     return drawn
 
@@ -243,7 +209,7 @@ def gains_figure(method: str, rows: Frame) -> Figure:
     only way in which they can be followed along it; the others on the path moved inside.
     """
     wanted = "printed" if method in tt.UNCHECKED else "thesis"
-    mine = some(rows, experiment=wanted, method=method).sort_values("kp_per_s2")
+    mine = select(rows, experiment=wanted, method=method).sort_values("kp_per_s2")
     words = f"Gazebo thesis, figures 6.{NUMBERS[method][0]} to 6.{NUMBERS[method][-1]}: "
     words += f"{words_of(method)}, position error and cable tensions by gain"
     drawn, grid = new_figure(len(mine), 2, (13.0, 1.6 + 3.4 * len(mine)), words)
@@ -267,89 +233,78 @@ def gains_figure(method: str, rows: Frame) -> Figure:
 
 def start_figure(rows: Frame) -> Figure:
     """Largest tension over the start error; a row for rows and rate, a column for a method."""
-    groups = dict(
-        [*some(rows, experiment=tt.START_ERROR).groupby(["balance", "control_rate_hz"], sort=False)]
-    )
+    mine = select(rows, experiment=tt.START_ERROR)
+    settings = mine[["balance", "control_rate_hz"]].drop_duplicates()
     title = (
         "Largest tension over the start error, by method and gain\n"
         "lines with symbols: found; thin: Gazebo thesis; crossed: lost"
     )
-    drawn, grid = new_figure(len(groups), len(tt.PRINTED), (14.0, 1.8 + 2.9 * len(groups)), title)
-    panels = np.reshape(np.array(grid, object), (len(groups), len(tt.PRINTED)))
+    size = (14.0, 1.8 + 2.9 * len(settings))
+    drawn, grid = new_figure(len(settings), len(tt.PRINTED), size, title)
+    panels: list[Axes] = list(np.ravel(grid))
     bound = load_robot(tt.THESIS_ROBOT).tension_limits()[1]
-    for line, ((balance, rate), mine) in zip(panels, groups.items(), strict=True):
-        for axes, (method, printed) in zip(line, tt.PRINTED.items(), strict=True):
-            for number, (gain, value) in enumerate(zip(tt.GAINS, printed, strict=True)):
-                runs = mine[(mine["method"] == method) & (mine["kp_per_s2"] == gain)].sort_values(
-                    "start_error_m"
-                )
-                if not len(runs):
-                    continue
-                look, sizes = nth_look(number), runs["tension_max_n"].clip(upper=DRAWN)
-                style = line_style(look) | {"marker": look.marker, "markersize": 5.0}
-                axes.plot(runs["start_error_m"], sizes, label=f"Kp = Kd = {gain:g}", **style)
-                lost = runs["lost"].astype(bool)
-                axes.plot(
-                    runs["start_error_m"][lost], sizes[lost], "x", color="black", markersize=10.0
-                )
-                mark = line_style(Look(look.color, DASHED, look.marker))
-                axes.axhline(value, **mark | {"linewidth": 1.0, "marker": ""})
-            axes.axhline(bound, label=f"upper bound {bound:g} N", **line_style(BOUND))
-            kind = "six rows" if balance == "wrench" else "three rows"
-            axes.set_title(f"{words_of(method)}, {kind}, {rate:g} Hz", fontsize=10)
-            axes.set(yscale="log", xlabel="start error [m]", ylabel="largest tension [N]")
-            axes.label_outer()
-    limits = [axes.get_ylim() for axes in panels.flat]
-    for axes in panels.flat:
-        axes.set_ylim(min(low for low, _ in limits), max(high for _, high in limits))
-    drawn.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    pairs = product(settings.itertuples(index=False), tt.PRINTED.items())
+    for axes, ((balance, rate), (method, printed)) in zip(panels, pairs, strict=True):
+        for number, (gain, value) in enumerate(zip(tt.GAINS, printed, strict=True)):
+            one = [balance, rate, method, gain]
+            keys = ["balance", "control_rate_hz", "method", "kp_per_s2"]
+            runs = mine[(mine[keys] == one).all(axis=1)].sort_values("start_error_m")
+            if not len(runs):
+                continue
+            look = nth_look(number)
+            _draw_largest(axes, runs, "start_error_m", look, f"Kp = Kd = {gain:g}")
+            lost = runs[runs["lost"].astype(bool)]
+            sizes = lost["tension_max_n"].clip(upper=DRAWN)
+            axes.plot(lost["start_error_m"], sizes, "x", color="black", markersize=10.0)
+            axes.axhline(value, color=look.color, linestyle=DASHED, linewidth=1.0)
+        axes.axhline(bound, label=f"upper bound {bound:g} N", **line_style(BOUND))
+        kind = "six rows" if balance == "wrench" else "three rows"
+        axes.set_title(f"{words_of(method)}, {kind}, {rate:g} Hz", fontsize=10)
+        axes.set(yscale="log", xlabel="start error [m]", ylabel="largest tension [N]")
+        axes.label_outer()
+    _same_heights(panels)
+    drawn.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return drawn
 
 
 def one_step_figure(rows: Frame) -> Figure:
     """Largest tensions where forces act for a tenth of the time, a panel for each method."""
-    mine = some(rows, experiment=tt.ONE_STEP)
+    mine = select(rows, experiment=tt.ONE_STEP).sort_values("kp_per_s2", kind="stable")
     title = "Largest tension where forces act for 1 ms of 10 ms"
-    drawn, grid = new_figure(1, len(tt.PRINTED), (14.0, 4.8), title)
-    for axes, (method, printed) in zip(
-        np.ravel(np.array(grid, object)), tt.PRINTED.items(), strict=True
-    ):
+    drawn, panels = new_figure(1, len(tt.PRINTED), (14.0, 4.8), title)
+    for axes, (method, printed) in zip(panels, tt.PRINTED.items(), strict=True):
         groups = mine[mine["method"] == method].groupby(["start", "between"], sort=False)
         for number, ((start, between), runs) in enumerate(groups):
-            ordered, look = runs.sort_values("kp_per_s2"), nth_look(number)
-            style = line_style(look) | {"marker": look.marker, "markersize": 5.0}
-            sizes, label = (
-                ordered["tension_max_n"].clip(upper=DRAWN),
-                f"start: {start}; between: {between}",
-            )
-            axes.plot(ordered["kp_per_s2"], sizes, label=label, **style)
+            label = f"start: {start}; between: {between}"
+            _draw_largest(axes, runs, "kp_per_s2", nth_look(number), label)
         axes.plot(tt.GAINS, printed, "k*", markersize=12.0, label="Gazebo thesis")
         axes.set(yscale="log", xlabel="Kp = Kd", ylabel="largest tension [N]")
         axes.set_title(words_of(method), fontsize=10)
         axes.label_outer()
-    drawn.legend(*drawn.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    drawn.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return drawn
+
+
+def _draw_largest(axes: Axes, runs: Frame, over: str, look: Look, label: str) -> None:
+    """Largest tensions of runs over one of their columns."""
+    sizes = runs["tension_max_n"].clip(upper=DRAWN)
+    style = line_style(look) | {"marker": look.marker, "markersize": 5.0}
+    axes.plot(runs[over], sizes, label=label, **style)
 
 
 def coverage_figure(rows: Frame) -> Figure:
     """Share of the feasible poses that each method solves, and its time for one."""
-    mine = some(rows, experiment=COVERAGE)
+    mine = select(rows, experiment=COVERAGE)
     robots, methods = list(mine["robot"].unique()), list(mine["method"].unique())
     drawn, (left, right) = new_figure(1, 2, (12.0, 6.5), "Coverage and speed of tension methods")
     height = 0.8 / len(robots)
     for k, (robot, runs) in enumerate(mine.groupby("robot", sort=False)):
-        places = (
-            np.array([methods.index(name) for name in runs["method"]]) + (k + 0.5) * height - 0.4
-        )
-        first, style = (
-            runs.iloc[0],
-            bar_style(look_of(robot, sorted({tt.THESIS_ROBOT, tt.OTHER_ROBOT}))),
-        )
+        places = runs["method"].map(methods.index) + (k + 0.5) * height - 0.4
+        style = bar_style(look_of(robot, sorted({tt.THESIS_ROBOT, tt.OTHER_ROBOT})))
+        first, shares = runs.iloc[0], 100.0 * runs["share"]
         label = f"{robot}, {first['feasible']:.0f} of {first['poses']:.0f} poses feasible"
-        bars = left.barh(places, 100.0 * runs["share"], height, label=label, **style)
-        left.bar_label(
-            bars, [f"{100.0 * share:.0f}" for share in runs["share"]], padding=2, fontsize=8
-        )
+        bars = left.barh(places, shares, height, label=label, **style)
+        left.bar_label(bars, fmt="{:.0f}", padding=2, fontsize=8)
         right.barh(places, runs["kernel_us"].astype(float), height, label=robot, **style)
     left.set(xlabel="feasible poses solved [%]", xlim=(0.0, 112.0))
     right.set(xlabel="one pose in a batch, on one core [us]")
@@ -363,43 +318,36 @@ def coverage_figure(rows: Frame) -> Figure:
 
 def _draw_tensions(axes: Any, run: Mapping[str, Any]) -> float:
     """Tensions over time and the lower bound; gives the upper one."""
-    robot = load_robot(run["robot"])
+    robot, arrays = load_robot(run["robot"]), run["arrays"]
     for k, cable in enumerate(robot.cables):
         draw_curve(
-            axes,
-            run["arrays"]["times_s"],
-            run["arrays"]["tensions_n"][:, k],
-            nth_look(k),
-            cable.name,
-            phase=phase_of(k, len(robot.cables)),
-            linewidth=1.0,
-            markersize=4.0,
-        )
+            axes, arrays["times_s"], arrays["tensions_n"][:, k], nth_look(k), cable.name,
+            phase=phase_of(k, len(robot.cables)), linewidth=1.0, markersize=4.0,
+        )  # fmt: skip
     low, high = robot.tension_limits()
     style = line_style(BOUND) | {"linewidth": 1.0, "zorder": 1}
     axes.axhline(low, label=f"lower bound {low:g} N", **style)
     return float(high)
 
 
-def _title(experiment: str) -> str:
-    return f"experiment '{experiment}'\n{tt.EXPERIMENTS[experiment].rstrip('.')}"
-
-
-def _panels(count: int, title: str) -> tuple[Figure, list[Axes]]:
+def _panels(count: int, what: str, experiment: str, ylabel: str) -> tuple[Figure, list[Axes]]:
+    title = f"{what}, experiment '{experiment}'\n{tt.EXPERIMENTS[experiment].rstrip('.')}"
     columns = min(3, count)
     rows = -(-count // columns)
     drawn, grid = new_figure(rows, columns, (max(4.2 * columns, 9.0), 1.2 + 3.2 * rows), title)
     panels: list[Axes] = list(np.ravel(grid))
-    for axes in panels[count:]:
-        axes.remove()
+    for k, axes in enumerate(panels):
+        axes.set_ylabel(ylabel if k % columns == 0 else "")
+        axes.set_xlabel("time [s]" if k + columns >= count else "")
+        if k >= count:
+            axes.remove()
     return drawn, panels[:count]
 
 
-def _name_axes(panels: Sequence[Axes], ylabel: str) -> None:
-    columns = min(3, len(panels))
-    for k, axes in enumerate(panels):
-        axes.set_ylabel(ylabel if k % columns == 0 else "")
-        axes.set_xlabel("time [s]" if k + columns >= len(panels) else "")
+def _same_heights(panels: Sequence[Axes]) -> None:
+    limits = np.array([axes.get_ylim() for axes in panels])
+    for axes in panels:
+        axes.set_ylim(limits[:, 0].min(), limits[:, 1].max())
 
 
 def _named(make: Any, names: Iterable[str], ending: str = "", before: str = "") -> dict[str, Any]:

@@ -6,20 +6,21 @@ it by compiled steps, without a diagram where the block is a `TensionDistributor
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator, SimulatorStatus
+from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_each, seconds_per_call
-from cdpr_drake.analyses.simulation.run_loop import advance
+from cdpr_drake.analyses.simulation.run_loop import advance, fixed_step_simulator
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.arrays import Array
@@ -126,15 +127,11 @@ class TensionTrial:
             "kp_per_s2": self.stiffness,
         }
 
-    def trajectory(self) -> PoseTrajectory:
-        """The desired motion."""
-        return PoseTrajectory(self.path, self.legs)
-
     def build(self) -> TensionControl:
         """The diagram."""
         held = self.applied == Applied.HELD
         settings = TensionControlSettings(
-            trajectory=self.trajectory(),
+            trajectory=PoseTrajectory(self.path, self.legs),
             gains=TaskGains(self.stiffness, self.damping),
             method=self.method,
             rate=self.rate,
@@ -142,39 +139,6 @@ class TensionTrial:
             distributor=TensionDistributor if held else UncheckedDistributor,
         )
         return build_tension_control(load_robot(self.robot), settings)
-
-
-class _Recorder:
-    """A monitor that keeps position and tensions of every step, and ends a run that is lost."""
-
-    def __init__(self, control: TensionControl, context: Context, spec: TensionTrial) -> None:
-        rows = round(spec.duration / STEP) + 2
-        plant = control.in_plant.plant
-        self._instance = control.in_plant.model_instance
-        self._positions = plant.GetPositions
-        self._plant_context = plant.GetMyContextFromRoot(context)
-        distributor = control.diagram.GetSubsystemByName("distributor")
-        self._tensions = distributor.GetOutputPort("tensions").Eval
-        self._distributor_context = distributor.GetMyContextFromRoot(context)
-        self._motion = spec.trajectory().motion
-        self.rows = np.empty((rows, 2 + len(control.robot.cables)))
-        self.count = 0
-        self.lost = False
-
-    def __call__(self, context: Context) -> EventStatus:
-        now = context.get_time()
-        if now == 0.0 or self.count == len(self.rows):  # before the first control step
-            return EventStatus.DidNothing()
-        row = self.rows[self.count]
-        place = self._positions(self._plant_context, self._instance)[4:7]
-        away = place - self._motion(now)[4:7]
-        row[0], row[1] = now, np.sqrt(away @ away)
-        row[2:] = self._tensions(self._distributor_context)
-        self.count += 1
-        self.lost = not row[1] < LOST_DISTANCE
-        if self.lost:
-            return EventStatus.ReachedTermination(None, "lost")
-        return EventStatus.DidNothing()
 
 
 def run_trial(spec: TensionTrial) -> dict[str, Any]:
@@ -196,52 +160,55 @@ def run_trial(spec: TensionTrial) -> dict[str, Any]:
     control = spec.build()
     context = control.make_context()
     if any(spec.offset):
-        start = spec.trajectory().pose(0.0)
+        start = control.trajectory.pose(0.0)
         start.set_translation(start.translation() + spec.offset)
-        plant_context = control.in_plant.plant.GetMyMutableContextFromRoot(context)
-        control.in_plant.set_pose(plant_context, start)
-    simulator = Simulator(control.diagram, context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
-    recorder = _Recorder(control, context, spec)
-    simulator.set_monitor(recorder)
+        control.set_pose(context, start)
+    plant, platform = control.in_plant.plant, control.in_plant.model_instance
+    plant_context = plant.GetMyContextFromRoot(context)
+    most, steps = round(spec.duration / STEP) + 2, list[Array]()
 
-    def outcome_after(status: SimulatorStatus) -> Outcome:
-        if recorder.lost:
+    def lost() -> bool:
+        return bool(steps) and not steps[-1][1] < LOST_DISTANCE
+
+    def record(context: Context) -> EventStatus:
+        """Keeps time, error and tensions of a step, and ends a run that is lost."""
+        now = context.get_time()
+        if now == 0.0 or len(steps) == most:  # before the first control step
+            return EventStatus.DidNothing()
+        place = plant.GetPositions(plant_context, platform)[4:7]
+        away = place - control.trajectory.motion(now)[4:7]
+        tensions = control.diagram.GetOutputPort("tensions").Eval(context)
+        steps.append(np.array([now, np.sqrt(away @ away), *tensions]))
+        return EventStatus.ReachedTermination(None, "lost") if lost() else EventStatus.DidNothing()
+
+    def outcome_after(_: SimulatorStatus) -> Outcome:
+        if lost():
             return Outcome.DIVERGED
         done = context.get_time() >= spec.duration * (1.0 - 1e-9)
         return Outcome.COMPLETED if done else Outcome.RUNNING
 
-    end = advance(
-        simulator,
-        spec.duration,
-        outcome_after,
-        lambda: control.errors(context),
-        RunSession(),
-    )
-    if end.outcome == Outcome.INTERRUPTED:  # what is there is not a whole run
+    simulator = fixed_step_simulator(control.diagram, context, "runge_kutta3", STEP)
+    simulator.set_monitor(record)
+    errors = partial(control.errors, context)
+    outcome = advance(simulator, spec.duration, outcome_after, errors, RunSession()).outcome
+    if outcome == Outcome.INTERRUPTED:  # what is there is not a whole run
         raise KeyboardInterrupt
-    failures = int(control.diagram.GetOutputPort("failures").Eval(context)[0])
-    rows = recorder.rows[: recorder.count]
-    return _trial_row(spec, rows, end.outcome == Outcome.DIVERGED, failures)
-
-
-def _trial_row(spec: TensionTrial, rows: Array, lost: bool, failures: int) -> dict[str, Any]:
-    times, errors, tensions = rows[:, 0], rows[:, 1], rows[:, 2:]
-    held = max(1, round(1.0 / (spec.rate * STEP)))  # integration steps per control step
-    chosen = tensions[::held]
-    jumps = np.abs(np.diff(chosen, axis=0))
+    rows = np.array(steps)
+    times, errors_m, tensions_n = rows[:, 0], rows[:, 1], rows[:, 2:]
+    chosen = tensions_n[:: max(1, round(1.0 / (spec.rate * STEP)))]  # of each control step
     some = slice(None, None, max(1, len(times) // KEPT_ROWS))
     return {
         "kd_per_s": spec.damping, "control_rate_hz": spec.rate, "start_offset_m": spec.offset,
-        "wanted_duration_s": spec.duration, "end_time_s": times[-1], "lost": lost,
-        "position_error_max_m": np.max(errors), "position_error_mean_m": np.mean(errors),
-        "position_error_last_tenth_m": np.mean(errors[-max(1, len(errors) // 10) :]),
-        "tension_max_n": np.max(tensions), "tension_min_n": np.min(tensions),
-        "tension_jump_max_n": np.max(jumps, initial=0.0),
-        "negative_tensions": int(np.sum(chosen < 0.0)), "failures": failures,
-        "control_steps": len(chosen),
-        "times_s": times[some].copy(), "errors_m": errors[some].copy(),
-        "tensions_n": tensions[some].copy(),
+        "wanted_duration_s": spec.duration, "end_time_s": times[-1],
+        "lost": outcome == Outcome.DIVERGED,
+        "position_error_max_m": np.max(errors_m), "position_error_mean_m": np.mean(errors_m),
+        "position_error_last_tenth_m": np.mean(errors_m[-max(1, len(errors_m) // 10) :]),
+        "tension_max_n": np.max(tensions_n), "tension_min_n": np.min(tensions_n),
+        "tension_jump_max_n": np.max(np.abs(np.diff(chosen, axis=0)), initial=0.0),
+        "negative_tensions": int(np.sum(chosen < 0.0)),
+        "failures": int(control.diagram.GetOutputPort("failures").Eval(context)[0]),
+        "control_steps": len(chosen), "times_s": times[some].copy(),
+        "errors_m": errors_m[some].copy(), "tensions_n": tensions_n[some].copy(),
     }  # fmt: skip
 
 
@@ -250,9 +217,6 @@ LOOK = 1.0
 
 PULSE_RATE = 1.0 / STEP
 """Steps of Gazebo per second; forces that are set for one act so long [Hz]."""
-
-LAST_PART = 0.5
-"""Share of a run in which what came of its start is over."""
 
 NOTHING, STATIC = "nothing", "tensions of rest"
 """What acts between steps in which commanded forces do; the second acts in these too."""
@@ -266,14 +230,8 @@ class PulsedDistributor(UncheckedDistributor):
     """
 
     def __init__(self, *settings: Any, every: int, between: Array, **options: Any) -> None:
-        """Arguments as of `TensionDistributor`, with the rate of Gazebo's steps.
-
-        Args:
-            settings: Of `TensionDistributor`.
-            every: Steps of Gazebo from one control step to the next.
-            between: Tensions that act all the time, shape (m,) [N].
-            options: Of `TensionDistributor`.
-        """
+        """Arguments as of `TensionDistributor`; beside them steps of Gazebo in a control step, and
+        tensions that act between, shape (m,) [N]."""
         super().__init__(*settings, **options)
         self._every, self._between = every, between
 
@@ -289,21 +247,15 @@ class PulsedDistributor(UncheckedDistributor):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StartTrial:
-    """What to simulate.
+    """What to simulate, beside a straight path; see `TensionTrial` for other attributes.
 
     Attributes:
-        experiment: Name of the experiment that the run belongs to.
-        robot: Name of the robot.
-        path: Where a straight path of Po starts and ends, shape (2, 3) [m].
+        path: Where the path of Po starts and ends, shape (2, 3) [m].
         leg: Time that it takes [s].
-        method: A name of `tensions.METHODS`.
         gain: Kp [1/s^2] and Kd [1/s].
-        applied: What is done with tensions out of bounds.
         balance: A name of `force_balance.BALANCES`.
-        rate: Control steps per second [Hz].
         start: Words for where the platform starts.
         position: That place of Po, shape (3,) [m].
-        duration: Simulated time [s].
         between: What acts between the steps in which forces act; empty: they act all the time.
     """
 
@@ -335,13 +287,14 @@ class StartTrial:
             "between": self.between,
         }
 
-    def start_error(self) -> float:
-        """How far it starts from its path's start [m]."""
-        return float(np.linalg.norm(self.position - self.path[0]))
-
     def build(self) -> TensionControl:
         """The diagram."""
         robot = load_robot(self.robot)
+        held = self.applied == Applied.HELD
+        distributor: Any = TensionDistributor if held else UncheckedDistributor
+        if self.between:
+            every, tensions = round(PULSE_RATE / self.rate), self.resting_tensions(robot)
+            distributor = partial(PulsedDistributor, every=every, between=tensions)
         settings = TensionControlSettings(
             trajectory=PoseTrajectory(
                 tuple(pose_from_angles(p, np.zeros(3)) for p in self.path), (self.leg,)
@@ -351,7 +304,7 @@ class StartTrial:
             rate=PULSE_RATE if self.between else self.rate,
             balance=self.balance,
             push=self.applied == Applied.PUSHED,
-            distributor=self._distributor(robot),
+            distributor=distributor,
             rule=StepRule(max_step=STEP),
         )
         return build_tension_control(robot, settings, log_rate=settings.rate)
@@ -368,34 +321,6 @@ class StartTrial:
         if found is None:
             raise InfeasibleTensionError(f"{robot.name}: no tensions hold the platform at home")
         return found
-
-    def _distributor(self, robot: Robot) -> Any:
-        if self.between:
-            every = round(PULSE_RATE / self.rate)
-            return partial(PulsedDistributor, every=every, between=self.resting_tensions(robot))
-        return TensionDistributor if self.applied == Applied.HELD else UncheckedDistributor
-
-
-class _DiagramLoop:
-    """A `TensionControl` in Drake's simulator, used as a `TensionLoop` is."""
-
-    def __init__(self, control: TensionControl, start: RigidTransform) -> None:
-        self.control = control
-        self._context = control.make_context()
-        control.set_pose(self._context, start)
-        self._simulator = Simulator(control.diagram, self._context)
-        self._simulator.Initialize()
-
-    def advance_to(self, time: float) -> None:
-        self._simulator.AdvanceTo(time)
-
-    def errors(self) -> tuple[float, float]:
-        return self.control.errors(self._context)
-
-    def columns(self) -> dict[str, Array]:
-        log = self.control.log
-        assert log is not None
-        return log.read(self._context)
 
 
 def run_start_trial(spec: StartTrial) -> dict[str, Any]:
@@ -414,46 +339,45 @@ def run_start_trial(spec: StartTrial) -> dict[str, Any]:
     """
     control = spec.build()
     start = pose_from_angles(spec.position, np.zeros(3))
-    loop: TensionLoop | _DiagramLoop
+    start_error = float(np.linalg.norm(spec.position - spec.path[0]))
+    advance_to: Callable[[float], Any]
+    errors: Callable[[], tuple[float, float]]
     if can_be_compiled(control):
         loop = TensionLoop(control, spec.rate, start)
+        advance_to, errors, columns = loop.advance_to, loop.errors, loop.columns
     else:
-        loop = _DiagramLoop(control, start)
-    limit, lost, time = LOST_DISTANCE + spec.start_error(), False, 0.0
+        assert control.log is not None
+        context = control.make_context()
+        control.set_pose(context, start)
+        simulator = Simulator(control.diagram, context)
+        simulator.Initialize()
+        advance_to, errors = simulator.AdvanceTo, partial(control.errors, context)
+        columns = partial(control.log.read, context)
+    lost, time = False, 0.0
     while time < spec.duration and not lost:
         time = min(time + LOOK, spec.duration)
         try:
-            loop.advance_to(time)
+            advance_to(time)
+            lost = not errors()[0] < LOST_DISTANCE + start_error
         except DivergedError:
             lost = True
-        else:
-            lost = not loop.errors()[0] < limit
-    return _start_row(spec, control, loop.columns(), lost)
-
-
-def _start_row(
-    spec: StartTrial, control: TensionControl, log: dict[str, Array], lost: bool
-) -> dict[str, Any]:
-    robot = control.robot
+    log = columns()
     times, states, tensions = log["time"], log["platform_state"], log["tensions"]
     # A row stands before the control step of its time: the next one has what this step asked for.
+    asked = tensions[1:]
     if spec.between:
-        chosen = slice(1, None, round(PULSE_RATE / spec.rate))
-        tensions = tensions - spec.resting_tensions(robot)
-    else:
-        chosen = slice(1, None)
-    asked = tensions[chosen]
+        resting = spec.resting_tensions(control.robot)
+        asked = asked[:: round(PULSE_RATE / spec.rate)] - resting
     tenth = slice(-max(1, len(times) // 10), None)
     where = np.array([control.trajectory.motion(time)[4:7] for time in times[tenth]])
     away = np.linalg.norm(states[tenth, 4:7] - where, axis=1)
     q = states[:, :4] / np.linalg.norm(states[:, :4], axis=1)[:, np.newaxis]
-    last = asked[round((1.0 - LAST_PART) * len(asked)) :]
     return {
-        "start_error_m": spec.start_error(), "wanted_duration_s": spec.duration,
+        "start_error_m": start_error, "wanted_duration_s": spec.duration,
         "end_time_s": times[-1], "lost": lost,
         "tension_max_n": np.max(asked), "tension_min_n": np.min(asked),
         "tension_first_max_n": np.max(asked[0]),
-        "tension_last_max_n": None if lost else np.max(last),
+        "tension_last_max_n": None if lost else np.max(asked[round(0.5 * len(asked)) :]),
         "turn_max_rad": 2.0 * np.max(np.arctan2(np.linalg.norm(q[:, 1:], axis=1), np.abs(q[:, 0]))),
         "position_error_last_tenth_m": np.mean(away),
         "failures": int(log["failures"][-1, 0]), "control_steps": len(asked),
@@ -466,43 +390,33 @@ PATH_STEPS = 1000
 FINE = 1e-6
 """How closely the least shift is found [m]."""
 
+MARGIN = 0.01
+"""What an end moves beyond its limit, if it has to move at all: at the limit itself no tensions are
+left to control with [m]."""
 
-@dataclass(frozen=True)
-class HeldPath:
+
+class HeldPath(NamedTuple):
     """A straight path of Po that the robot holds everywhere, and what was changed for it.
 
     Attributes:
-        start: Where it starts, shape (3,) [m].
-        end: Where it ends, shape (3,) [m].
-        start_limit: Least distance by which the start had to move towards the inside [m].
-        end_limit: The same of the end [m].
-        start_shift: Distance by which the start moved, its limit and the margin [m].
-        end_shift: The same of the end [m].
+        ends: Where it starts and ends, shape (3,) each [m].
+        limits: Least distances by which these had to move towards the inside [m].
+        shifts: Distances by which they moved [m].
     """
 
-    start: Array
-    end: Array
-    start_limit: float
-    end_limit: float
-    start_shift: float
-    end_shift: float
+    ends: tuple[Array, Array]
+    limits: tuple[float, float]
+    shifts: tuple[float, float]
 
 
-def can_hold(robot: Robot, position: Array, limits: tuple[float, float] | None = None) -> bool:
+def can_hold(robot: Robot, position: Array) -> bool:
     """Whether tensions hold the unturned platform at rest with Po at a position [m]; exact."""
     X_WP = pose_from_angles(position, np.zeros(3))
     cables = robot.cable_set(pulleys=False)  # as in the theses
-    return exact_tensions(tension_problem(robot, X_WP, limits=limits, cables=cables)) is not None
+    return exact_tensions(tension_problem(robot, X_WP, cables=cables)) is not None
 
 
-def held_path(
-    robot: Robot,
-    start: Array,
-    end: Array,
-    inside: Array,
-    margin: float = 0.01,
-    limits: tuple[float, float] | None = None,
-) -> HeldPath:
+def held_path(robot: Robot, start: Array, end: Array, inside: Array) -> HeldPath:
     """Moves each end straight towards the inside until it and then the path between can be held.
 
     Args:
@@ -510,50 +424,44 @@ def held_path(
         start: Wanted start of Po, unturned platform, shape (3,) [m].
         end: Wanted end, shape (3,) [m].
         inside: A position that can be held, shape (3,) [m].
-        margin: What an end moves beyond its limit, if it has to move at all: at the limit itself
-            no tensions are left to control with [m].
-        limits: Smallest and largest tension [N]; None: the robot's.
 
     Raises:
         InfeasibleTensionError: The inside cannot be held, or no such path was found.
     """
-    start, end, inside = (np.asarray(p, float) for p in (start, end, inside))
-    if not can_hold(robot, inside, limits):
+    wanted, inside = np.array([start, end], float), np.asarray(inside, float)
+    if not can_hold(robot, inside):
         raise InfeasibleTensionError(f"{robot.name}: no tensions hold the platform at {inside}")
-    bounds = [_least_shift(robot, p, inside, limits) for p in (start, end)]
-    shifts = [bound + margin if bound > 0.0 else 0.0 for bound in bounds]
+    ways = inside - wanted
+    lengths = [float(np.linalg.norm(way)) for way in ways]
+
+    def moved(which: int, shift: float) -> Array:
+        length = lengths[which]
+        return wanted[which] + ways[which] * (min(shift / length, 1.0) if length > 0.0 else 0.0)
+
+    def least_shift(which: int) -> float:
+        if can_hold(robot, wanted[which]):
+            return 0.0
+        bad, good = 0.0, lengths[which]
+        while good - bad > FINE:
+            middle = (bad + good) / 2.0
+            if can_hold(robot, moved(which, middle)):
+                good = middle
+            else:
+                bad = middle
+        return good
+
+    limits = least_shift(0), least_shift(1)
+    shifts = [limit + MARGIN if limit > 0.0 else 0.0 for limit in limits]
     while True:
-        ends = [_towards(p, inside, shift) for p, shift in zip((start, end), shifts, strict=True)]
+        first, last = ends = moved(0, shifts[0]), moved(1, shifts[1])
         shares = np.linspace(0.0, 1.0, PATH_STEPS + 1)
-        bad = [s for s in shares if not can_hold(robot, ends[0] + s * (ends[1] - ends[0]), limits)]
+        bad = [share for share in shares if not can_hold(robot, first + share * (last - first))]
         if not bad:
-            return HeldPath(ends[0], ends[1], bounds[0], bounds[1], shifts[0], shifts[1])
+            return HeldPath(ends, limits, (shifts[0], shifts[1]))
         nearer = 0 if np.mean(bad) <= 0.5 else 1  # the end next to what cannot be held
-        shifts[nearer] += margin
-        if margin <= 0.0 or shifts[nearer] > float(np.linalg.norm((start, end)[nearer] - inside)):
+        shifts[nearer] += MARGIN
+        if shifts[nearer] > lengths[nearer]:
             raise InfeasibleTensionError(f"{robot.name}: found no path that can be held throughout")
-
-
-def _towards(position: Array, inside: Array, shift: float) -> Array:
-    way = inside - position
-    length = float(np.linalg.norm(way))
-    return position + way * (min(shift / length, 1.0) if length > 0.0 else 0.0)
-
-
-def _least_shift(
-    robot: Robot, position: Array, inside: Array, limits: tuple[float, float] | None
-) -> float:
-    """Least distance towards the inside from which on the platform is held, by bisection [m]."""
-    if can_hold(robot, position, limits):
-        return 0.0
-    bad, good = 0.0, float(np.linalg.norm(inside - position))
-    while good - bad > FINE:
-        middle = (bad + good) / 2.0
-        if can_hold(robot, _towards(position, inside, middle), limits):
-            good = middle
-        else:
-            bad = middle
-    return good
 
 
 THESIS_ROBOT = "caroca_gazebo"
@@ -566,12 +474,18 @@ THESIS_END = (3.0, 1.0, 3.0)
 THESIS_DURATION = 100.0
 """Gazebo thesis 6.2 [s]."""
 
-THESIS_GAINS: dict[str, tuple[float, ...]] = {
-    "linear_program": (100.0, 800.0, 1200.0),
-    "quadratic_program": (100.0, 800.0, 1200.0, 1500.0),
-    "pseudo_inverse": (100.0, 800.0, 1200.0),
-    "closed_form": (100.0, 800.0, 1200.0),
+PRINTED = {
+    "linear_program": (54.0, 456.0, 1224.0),
+    "quadratic_program": (32.0, 110.0, 342.0),
+    "pseudo_inverse": (117.0, 117.0, 117.0),
+    "closed_form": (267.0, 385.0, 517.0),
 }
+"""Largest tension by method at `GAINS` [N]. Source: Gazebo thesis 6.4.1 to 6.4.4."""
+
+GAINS = (100.0, 800.0, 1200.0)
+"""Gains Kp at which these are printed [1/s^2]."""
+
+THESIS_GAINS = dict.fromkeys(PRINTED, GAINS) | {"quadratic_program": (*GAINS, 1500.0)}
 """Kp = Kd of the methods that the Gazebo thesis runs, figures 6.8 to 6.20 [1/s^2, 1/s]."""
 
 UNCHECKED = ("pseudo_inverse", "closed_form")
@@ -590,7 +504,6 @@ EXPERIMENTS = {
 }
 """What the experiments are, by name."""
 
-
 GRID, QUICK_GRID = (13, 13, 9), (5, 5, 3)
 """Poses on which methods are compared, along x, y and z."""
 
@@ -599,10 +512,10 @@ GRID, QUICK_GRID = (13, 13, 9), (5, 5, 3)
 def thesis_path() -> HeldPath:
     """How the thesis' path was moved inside; positions of Po."""
     robot = load_robot(THESIS_ROBOT)
-    return held_path(robot, *printed_ends(), robot.home.position)
+    return held_path(robot, *printed_ends(), np.array(robot.home.position, float))
 
 
-def printed_ends() -> tuple[np.ndarray, np.ndarray]:
+def printed_ends() -> tuple[Array, Array]:
     """Where the thesis' path starts and ends, shape (3,) each, of Po [m]."""
     # The thesis' platform frame lies in the middle of the box, P in the middle of its bottom.
     middle = np.array([0.0, 0.0, float(load_robot(THESIS_ROBOT).platform.size[2]) / 2.0])
@@ -610,123 +523,72 @@ def printed_ends() -> tuple[np.ndarray, np.ndarray]:
 
 
 def trials(quick: bool) -> list[TensionTrial]:
-    """All runs, or short ones that only show that everything works, in the order of the
-    experiments."""
-    specs = _thesis(thesis_path(), quick) + _printed(printed_ends(), quick) + _acrobot(quick)
+    """All runs, or short ones of some, in the order of the experiments."""
+    ends, home = thesis_path().ends, load_robot(THESIS_ROBOT).home.position
+    gains = {method: some[:1] if quick else some for method, some in THESIS_GAINS.items()}
     if not quick:
-        specs += _step() + _slow(thesis_path())
-    order = list(EXPERIMENTS)
-    return sorted(specs, key=lambda spec: order.index(spec.experiment))
-
-
-def _straight(start: np.ndarray, end: np.ndarray, duration: float) -> dict[str, Any]:
-    poses = tuple(pose_from_angles(p, np.zeros(3)) for p in (start, end))
-    return {"path": poses, "legs": (duration,)}
-
-
-def _thesis(path: HeldPath, quick: bool) -> list[TensionTrial]:
+        gains |= {"improved_closed_form": (100.0,), "barycenter": (100.0,)}
     duration = 1.0 if quick else THESIS_DURATION
-    way = _straight(path.start, path.end, THESIS_DURATION)
-
-    def spec(method: str, gain: float, applied: Applied = Applied.HELD) -> TensionTrial:
-        return TensionTrial(
-            experiment="thesis",
-            robot=THESIS_ROBOT,
-            **way,
-            method=method,
-            stiffness=gain,
-            damping=gain,
-            duration=duration,
-            applied=applied,
-        )
-
-    specs = []
-    for method, gains in THESIS_GAINS.items():
-        for gain in gains[:1] if quick else gains:
-            specs.append(spec(method, gain))
-            if method in UNCHECKED:
-                specs += [spec(method, gain, how) for how in (Applied.CUT, Applied.PUSHED)]
-    if not quick:
-        specs += [spec(method, 100.0) for method in ("improved_closed_form", "barycenter")]
-    return specs
-
-
-def _printed(ends: tuple[np.ndarray, np.ndarray], quick: bool) -> list[TensionTrial]:
-    way = _straight(*ends, THESIS_DURATION)
-    return [
-        TensionTrial(
-            experiment="printed",
-            robot=THESIS_ROBOT,
-            **way,
-            method=method,
-            stiffness=gain,
-            damping=gain,
-            duration=0.5 if quick else THESIS_DURATION,
+    specs = [
+        straight_trial("thesis", ends, duration, method, gain, applied=applied)
+        for method, some in gains.items()
+        for gain in some
+        for applied in (Applied if method in UNCHECKED else [Applied.HELD])
+    ]
+    specs += [
+        straight_trial(
+            "printed", printed_ends(), 0.5 if quick else THESIS_DURATION, method, gain,
             applied=Applied.PUSHED,
         )
         for method in UNCHECKED
-        for gain in (THESIS_GAINS[method][:1] if quick else THESIS_GAINS[method])
-    ]
+        for gain in gains[method]
+    ]  # fmt: skip
+    if not quick:
+        specs += [
+            straight_trial(
+                experiment, (home, home), 8.0, method, gain,
+                legs=(1.0,), offset=(0.0, 0.0, -below),
+            )
+            for experiment, below in STEPS_BELOW.items()
+            for method in ("linear_program", "quadratic_program")
+            for gain in gains[method]
+        ]  # fmt: skip
+        specs += [
+            straight_trial("slow", ends, 20.0, "quadratic_program", gain, rate=100.0)
+            for gain in gains["quadratic_program"]
+        ]
+    return specs + acrobot_trials(quick)
 
 
-def _step() -> list[TensionTrial]:
-    home = load_robot(THESIS_ROBOT).home.position
-    return [
-        TensionTrial(
-            experiment=experiment,
-            robot=THESIS_ROBOT,
-            **_straight(home, home, 1.0),
-            method=method,
-            stiffness=gain,
-            damping=gain,
-            duration=8.0,
-            offset=(0.0, 0.0, -below),
-        )
-        for experiment, below in STEPS_BELOW.items()
-        for method in ("linear_program", "quadratic_program")
-        for gain in THESIS_GAINS[method]
-    ]
+def straight_trial(
+    experiment: str, ends: tuple[Any, Any], duration: float, method: str, gain: float,
+    legs: tuple[float, ...] = (THESIS_DURATION,), **changes: Any,
+) -> TensionTrial:  # fmt: skip
+    """A run of the thesis' robot along a straight path of Po [m], with Kp = Kd."""
+    return TensionTrial(
+        experiment=experiment, robot=THESIS_ROBOT, method=method, stiffness=gain, damping=gain,
+        path=tuple(pose_from_angles(place, np.zeros(3)) for place in ends), legs=legs,
+        duration=duration, **changes,
+    )  # fmt: skip
 
 
-def _slow(path: HeldPath) -> list[TensionTrial]:
-    return [
-        TensionTrial(
-            experiment="slow",
-            robot=THESIS_ROBOT,
-            **_straight(path.start, path.end, THESIS_DURATION),
-            method="quadratic_program",
-            stiffness=gain,
-            damping=gain,
-            duration=20.0,
-            rate=100.0,
-        )
-        for gain in THESIS_GAINS["quadratic_program"]
-    ]
-
-
-def _acrobot(quick: bool) -> list[TensionTrial]:
+def acrobot_trials(quick: bool) -> list[TensionTrial]:
+    """Runs of the other robot, by every method that fits it."""
     robot = load_robot(OTHER_ROBOT)
     home = robot.home.transform()
     away = pose_from_angles(
         home.translation() + np.array([0.2, -0.15, 0.25]), np.radians([4.0, -3.0, 6.0])
     )
-    leg = 2.0
     methods = applicable_methods(tension_problem(robot, home))
     if quick:
         methods = ["quadratic_program", "improved_closed_form"]
     return [
         TensionTrial(
-            experiment="acrobot",
-            robot=OTHER_ROBOT,
-            path=(home, away, home),
-            legs=(leg, leg),
-            method=method,
-            stiffness=100.0,
-            damping=20.0,
-            duration=0.5 if quick else 2.0 * leg + 0.5,
+            experiment="acrobot", robot=OTHER_ROBOT, path=(home, away, home), legs=(2.0, 2.0),
+            method=method, stiffness=100.0, damping=20.0, duration=0.5 if quick else 4.5,
         )
         for method in methods
-    ]
+    ]  # fmt: skip
 
 
 START_ERROR, ONE_STEP = "start_error", "one_step"
@@ -738,115 +600,47 @@ START_EXPERIMENTS = {
 }
 """What they are, by name."""
 
-ERRORS = (0.3, 0.4, 0.5, 0.6)
-"""Start errors, from printed tensions over gains [m]."""
-
 LAUNCH, ON_PATH = "launch", "path"
 """Starts that leave nothing to choose: where the robot is launched, and where the path starts."""
+
+ERRORS = {"0.3 m": 0.3, "0.4 m": 0.4, "0.5 m": 0.5, "0.6 m": 0.6}
+"""Start errors towards the place of launch, from printed tensions over gains [m]."""
+
+STARTS = (*ERRORS, LAUNCH)
+"""Where the platform starts in the experiment `START_ERROR`."""
 
 RATES = (1000.0, 100.0)
 """A step of Gazebo, and the publisher of the public code [Hz]."""
 
-GAINS = (100.0, 800.0, 1200.0)
-"""Gains Kp at which largest tensions are printed [1/s^2]."""
-
-PRINTED = {
-    "linear_program": (54.0, 456.0, 1224.0),
-    "quadratic_program": (32.0, 110.0, 342.0),
-    "pseudo_inverse": (117.0, 117.0, 117.0),
-    "closed_form": (267.0, 385.0, 517.0),
-}
-"""Largest tension by method at these gains [N]. Source: Gazebo thesis 6.4.1 to 6.4.4."""
-
-QUICK_ERROR, QUICK_TIME = 0.5, 1.0
-"""What the short form shows [m, s]."""
-
-
-def error_name(error: float) -> str:
-    """Words for a start that is so far from the path's [m]."""
-    return f"{error:g} m"
-
-
-STARTS = (*map(error_name, ERRORS), LAUNCH)
-"""Where the platform starts in the experiment `START_ERROR`."""
-
 
 def start_trials(quick: bool) -> list[StartTrial]:
     """All runs of both experiments, or a few short ones."""
-    combinations = [
-        (start, rate, balance) for start in STARTS for rate in RATES for balance in (WRENCH, FORCE)
-    ]
-    pulses = [(start, between) for start in (ON_PATH, LAUNCH) for between in (NOTHING, STATIC)]
-    gains: tuple[float, ...] = GAINS
-    if quick:
-        combinations = [(error_name(QUICK_ERROR), RATES[-1], one) for one in (WRENCH, FORCE)]
-        pulses, gains = [(ON_PATH, NOTHING)], GAINS[:1]
-    places = {method: _Places(path_of(method)) for method in PRINTED}  # once: they ask the robot
-    return [
-        _trial(
-            START_ERROR, method, gain, *combination,
-            between="", quick=quick, places=places[method],
-        )
-        for combination in combinations
-        for method, gain in product(PRINTED, gains)
+    beside = product(["0.5 m"], RATES[-1:]) if quick else product(STARTS, RATES)
+    pulses = product((ON_PATH, LAUNCH), (NOTHING, STATIC))
+    settings: list[dict[str, Any]] = [
+        {"experiment": START_ERROR, "start": start, "rate": rate, "balance": balance}
+        for (start, rate), balance in product(beside, (WRENCH, FORCE))
     ] + [
-        _trial(
-            ONE_STEP, method, gain, start, RATES[-1],
-            balance=FORCE, between=between, quick=quick, places=places[method],
-        )
-        for start, between in pulses
-        for method, gain in product(PRINTED, gains)
+        {"experiment": ONE_STEP, "start": start, "rate": RATES[-1], "balance": FORCE,
+         "between": between}
+        for start, between in ([(ON_PATH, NOTHING)] if quick else pulses)
     ]  # fmt: skip
-
-
-class _Places:
-    """Where runs of a method start.
-
-    Attributes:
-        path: Start and end of the path of Po, shape (3,) each [m].
-    """
-
-    def __init__(self, path: tuple[Array, Array]) -> None:
-        self.path = path
-        self._launch = np.array(load_robot(THESIS_ROBOT).home.position, float)
-
-    def of(self, start: str) -> Array:
-        """Where Po starts, shape (3,) [m]."""
-        if start == LAUNCH:
-            return self._launch.copy()
-        error = 0.0 if start == ON_PATH else ERRORS[STARTS.index(start)]
-        begins = self.path[0]
-        way = self._launch - begins
-        return np.asarray(begins + error * way / np.linalg.norm(way))
-
-
-def path_of(method: str) -> tuple[Array, Array]:
-    """Start and end of the path of Po that a method follows, shape (3,) each [m]."""
-    if method in UNCHECKED:
-        return printed_ends()
-    moved = thesis_path()
-    return moved.start, moved.end
-
-
-def _trial(
-    experiment: str, method: str, gain: float, start: str, rate: float, balance: str,
-    *, between: str, quick: bool, places: _Places,
-) -> StartTrial:  # fmt: skip
-    return StartTrial(
-        experiment=experiment,
-        robot=THESIS_ROBOT,
-        path=(places.path[0].copy(), places.path[1].copy()),
-        leg=THESIS_DURATION,
-        method=method,
-        gain=gain,
-        applied=Applied.PUSHED if method in UNCHECKED else Applied.HELD,
-        balance=balance,
-        rate=rate,
-        start=start,
-        position=places.of(start),
-        duration=QUICK_TIME if quick else THESIS_DURATION,
-        between=between,
-    )
+    launch = np.array(load_robot(THESIS_ROBOT).home.position, float)
+    specs = []
+    for setting, method in product(settings, PRINTED):
+        path = printed_ends() if method in UNCHECKED else thesis_path().ends
+        way, start = launch - path[0], setting["start"]
+        begin = path[0] + ERRORS.get(start, 0.0) * way / np.linalg.norm(way)
+        specs += [
+            StartTrial(
+                robot=THESIS_ROBOT, path=path, leg=THESIS_DURATION, method=method, gain=gain,
+                applied=Applied.PUSHED if method in UNCHECKED else Applied.HELD,
+                position=launch if start == LAUNCH else begin,
+                duration=1.0 if quick else THESIS_DURATION, **setting,
+            )
+            for gain in (GAINS[:1] if quick else GAINS)
+        ]  # fmt: skip
+    return specs
 
 
 TURNS_DEG = ((0.0, 0.0, 0.0), (5.0, -5.0, 10.0))
@@ -859,33 +653,35 @@ TRUTH = "linear_program"
 """The method whose verdict counts."""
 
 
-def grid_problems(robot_name: str, counts: tuple[int, int, int]) -> list[TensionProblem]:
+def grid_problems(
+    robot: Robot, counts: tuple[int, int, int], turns_deg: Sequence[Sequence[float]] = TURNS_DEG,
+    limits: tuple[float, float] | None = None,
+) -> list[TensionProblem]:  # fmt: skip
     """The problems of holding still at the poses of a grid that fills the robot's frame.
 
     A planar robot keeps to its plane, and turns about z only.
 
     Args:
-        robot_name: Name of the robot.
+        robot: The robot.
         counts: Positions along x, y and z.
+        turns_deg: Angles of the platform at every position [deg].
+        limits: Smallest and largest tension [N]; None: the robot's.
     """
-    robot = load_robot(robot_name)
     # Cells' middles, so that no position lies on the frame.
     axes = [
         low + (np.arange(count) + 0.5) * (high - low) / count
         for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
     ]
-    turns, cables = np.radians(TURNS_DEG), robot.cable_set(pulleys=False)
+    turns, cables = np.radians(turns_deg), robot.cable_set(pulleys=False)
     if robot.is_planar():
         axes[2] = robot.home.transform().translation()[2:]
         turns[:, :2] = 0.0
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     problems = []
-    for turn in turns:
-        for place in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3):
-            try:
-                X_WP = pose_from_angles(place, turn)
-                problems.append(tension_problem(robot, X_WP, cables=cables))
-            except TensionProblemError:  # W is singular
-                continue
+    for turn, place in product(turns, places):
+        with suppress(TensionProblemError):  # W is singular
+            X_WP = pose_from_angles(place, turn)
+            problems.append(tension_problem(robot, X_WP, limits=limits, cables=cables))
     return problems
 
 
@@ -899,17 +695,18 @@ def cover(robot_name: str, counts: tuple[int, int, int], method: str) -> dict[st
         call of `distribute` with its checks, on feasible poses, the median; kernel_us: one pose of
         the batch form on one core.
     """
-    problems = grid_problems(robot_name, counts)
-    truth = np.array([distribute(p, TRUTH).status == TensionStatus.FEASIBLE for p in problems])
-    feasible = [p for p, good in zip(problems, truth, strict=True) if good]
+    problems = grid_problems(load_robot(robot_name), counts)
     solutions = [distribute(p, method) for p in problems]
-    solved = np.array([s.status == TensionStatus.FEASIBLE for s in solutions])
-    said = np.array([s.status != TensionStatus.INFEASIBLE for s in solutions])
-    largest = [float(np.max(s.tensions)) for s, good in zip(solutions, solved, strict=True) if good]
+    truth = np.array([distribute(p, TRUTH).status for p in problems]) == TensionStatus.FEASIBLE
+    said = np.array([solution.status for solution in solutions])
+    solved = said == TensionStatus.FEASIBLE
+    feasible = [p for p, good in zip(problems, truth, strict=True) if good]
+    largest = [np.max(s.tensions) for s in solutions if s.status == TensionStatus.FEASIBLE]
     found = int(np.sum(solved & truth))
     return {
         "poses": len(problems), "feasible": len(feasible), "solved": found,
-        "share": found / max(len(feasible), 1), "wrong": int(np.sum(said != truth)),
+        "share": found / max(len(feasible), 1),
+        "wrong": int(np.sum((said != TensionStatus.INFEASIBLE) != truth)),
         "mean_largest_tension_n": float(np.mean(largest)) if largest else None,
         **_times(method, feasible[:TIMED]),
     }  # fmt: skip

@@ -5,24 +5,23 @@ Source: Gazebo thesis 6.2, figures 6.2 to 6.7; servoing thesis 1.3.4, figure 1.1
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from itertools import product
+from math import perm
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.reporting.timing import interleaved, processor_seconds
-from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.rows import Row
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
+from cdpr_drake.analyses.studies.tension_trials import TRUTH, grid_problems
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import PLATFORM, SOLID, nth_look
 from cdpr_drake.tensions.methods import (
@@ -70,9 +69,6 @@ COMPARED = ("pseudo_inverse", "improved_closed_form", "median", "barycenter")
 """Methods that are run on the grid; the improved closed form is that of [Pot14], which the thesis
 calls the median method."""
 
-TRUTH = "linear_program"
-"""The method whose verdict on existence counts; it always finds tensions where there are some."""
-
 GRID, QUICK_GRID = (13, 13, 9), (4, 4, 3)
 """Poses on which methods are compared, along x, y and z."""
 
@@ -99,26 +95,21 @@ def by_class() -> tuple[Array, ...]:
 
 def by_conditions() -> tuple[Array, ...]:
     """By a second program: the six conditions (6.9) to (6.14) as equations in six coefficients."""
-    powers = np.arange(6)
-    rows = []
-    for time in (0.0, DURATION):
-        for order in range(3):
-            factors = np.ones(6)
-            for k in range(order):
-                factors = factors * (powers - k)
-            rows.append(factors * np.power(time, np.maximum(powers - order, 0)))
+
+    def terms(time: float, order: int) -> list[float]:
+        """Derivatives of t^0 to t^5."""
+        return [perm(k, order) * time ** max(k - order, 0) for k in range(6)]
+
     rest = np.zeros(3)
-    conditions = np.array([START, rest, rest, END, rest, rest])
-    return motion_of(np.linalg.solve(np.array(rows), conditions))
+    rows = [terms(time, order) for time in (0.0, DURATION) for order in range(3)]
+    return motion_of(np.linalg.solve(rows, np.array([START, rest, rest, END, rest, rest])))
 
 
 def by_printed_coefficients() -> tuple[Array, ...]:
     """By (6.16) to (6.21) as they are printed, for a motion from rest to rest."""
     way = END - START
-    third = 20.0 * way / (2.0 * DURATION**3)
-    fourth = 30.0 * way / (2.0 * DURATION**4)
-    fifth = 12.0 * way / (2.0 * DURATION**5)
-    return motion_of(np.array([START, np.zeros(3), np.zeros(3), third, fourth, fifth]))
+    high = [factor * way / (2.0 * DURATION**k) for k, factor in ((3, 20.0), (4, 30.0), (5, 12.0))]
+    return motion_of(np.array([START, np.zeros(3), np.zeros(3), *high]))
 
 
 def motion_of(coefficients: Array) -> tuple[Array, ...]:
@@ -136,9 +127,9 @@ PROGRAMS = {
 
 def end_error(motion: tuple[Array, ...]) -> float:
     """How far a motion is off (6.9) to (6.14), the largest of all [m, m/s, m/s^2]."""
-    rest = np.zeros((2, 3))
-    ends = (np.array([START, END]), rest, rest)
-    return max(float(np.max(np.abs(x[[0, -1]] - end))) for x, end in zip(motion, ends, strict=True))
+    ends = np.array([x[[0, -1]] for x in motion])
+    ends[0] -= START, END
+    return float(np.max(np.abs(ends)))
 
 
 def trajectory() -> Row:
@@ -150,19 +141,17 @@ def trajectory() -> Row:
         name with each of `MOTION`.
     """
     motions = {name: program() for name, program in PROGRAMS.items()}
-    place, speed, acceleration = (
-        float(np.max(np.abs(a - b)))
-        for a, b in zip(motions["class"], motions["conditions"], strict=True)
-    )
+    pairs = zip(motions["class"], motions["conditions"], strict=True)
+    place, speed, acceleration = (float(np.max(np.abs(a - b))) for a, b in pairs)
+    curves = {
+        f"{name}_{quantity}": values
+        for name, motion in motions.items()
+        for quantity, values in zip(MOTION, motion, strict=True)
+    }
     return {
         "end_error": {name: end_error(motion) for name, motion in motions.items()},
         "difference_m": place, "difference_m_s": speed, "difference_m_s2": acceleration,
-        "times_s": TIMES,
-        **{
-            f"{name}_{quantity}": values
-            for name, motion in motions.items()
-            for quantity, values in zip(MOTION, motion, strict=True)
-        },
+        "times_s": TIMES, **curves,
     }  # fmt: skip
 
 
@@ -178,7 +167,10 @@ def polygon(pose: str) -> Row:
         shape (2,), and their least distance from a limit, margins_n; barycenter_n, by cable;
         unevenness, the largest distance of these from their mean, as a share of it.
     """
-    problem = problem_at(load_robot(ROBOT), np.array(POSES[pose]))
+    robot = load_robot(ROBOT)
+    X_WP = pose_from_angles(np.array(POSES[pose]), np.zeros(3))
+    limits, cables = (LEAST, robot.tension_limits()[1]), robot.cable_set(pulleys=False)
+    problem = tension_problem(robot, X_WP, limits=limits, cables=cables)
     tensions = {method: distribute(problem, method).tensions for method in SHOWN}
     _, N = solution_space(problem)
     x, y = vertices = feasible_polygon(problem)
@@ -197,15 +189,6 @@ def polygon(pose: str) -> Row:
     }
 
 
-def problem_at(robot: Robot, place: Array) -> TensionProblem:
-    """Holding the platform at a place [m], unturned, above `LEAST`, without pulleys."""
-    limits = (LEAST, robot.tension_limits()[1])
-    cables = robot.cable_set(pulleys=False)
-    return tension_problem(
-        robot, pose_from_angles(place, np.zeros(3)), limits=limits, cables=cables
-    )
-
-
 # Methods.
 
 
@@ -216,19 +199,9 @@ def held_problems(counts: tuple[int, int, int]) -> list[TensionProblem]:
         counts: Positions along x, y and z.
     """
     robot = load_robot(ROBOT)
-    axes = [
-        low + (np.arange(count) + 0.5) * (high - low) / count
-        for low, high, count in zip(robot.frame.lower, robot.frame.upper, counts, strict=True)
-    ]
-    problems = []
-    for place in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3):
-        try:
-            problem = problem_at(robot, place)
-        except TensionProblemError:  # W is singular
-            continue
-        if distribute(problem, TRUTH).status == TensionStatus.FEASIBLE:
-            problems.append(problem)
-    return problems
+    limits = (LEAST, robot.tension_limits()[1])
+    problems = grid_problems(robot, counts, [(0.0, 0.0, 0.0)], limits)
+    return [p for p in problems if distribute(p, TRUTH).status == TensionStatus.FEASIBLE]
 
 
 def methods(grid: tuple[int, int, int], repeats: int) -> Row:
@@ -250,23 +223,17 @@ def methods(grid: tuple[int, int, int], repeats: int) -> Row:
     w = np.tile(np.array([p.wrench for p in problems]), (again, 1))
     low, high = problems[0].lower, problems[0].upper
 
-    def cost(method: str) -> float:
-        return processor_seconds(lambda: distribute_batch(W, w, low, high, method, threads=1))
-
-    seconds = interleaved([partial(cost, method) for method in COMPARED], repeats)
-    row: dict[str, Any] = {"poses": len(problems), "solved": {}, "wrong": {}, "pushing": {}}
-    for method in COMPARED:
-        solutions = [distribute(problem, method) for problem in problems]
-        solved = [
-            (problem, solution.tensions)
-            for problem, solution in zip(problems, solutions, strict=True)
-            if solution.status == TensionStatus.FEASIBLE
-        ]
-        row["solved"][method] = len(solved)
-        row["wrong"][method] = sum(not holds(*pair) for pair in solved)
-        row["pushing"][method] = sum(bool(np.any(s.tensions < 0.0)) for s in solutions)
-    costs = {m: 1e6 * time / len(W) for m, time in zip(COMPARED, seconds, strict=True)}
-    return {**row, "cost_us": costs}
+    works = [partial(distribute_batch, W, w, low, high, method, threads=1) for method in COMPARED]
+    seconds = interleaved([partial(processor_seconds, work) for work in works], repeats)
+    costs = dict(zip(COMPARED, (1e6 * time / len(W) for time in seconds), strict=True))
+    found = []
+    for method, problem in product(COMPARED, problems):
+        solution = distribute(problem, method)
+        t, solved = solution.tensions, solution.status == TensionStatus.FEASIBLE
+        wrong, pushing = solved and not holds(problem, t), bool(np.any(t < 0.0))
+        found.append({"method": method, "solved": solved, "wrong": wrong, "pushing": pushing})
+    counts = Frame(found).groupby("method", sort=False).sum()
+    return {"poses": len(problems), **counts.to_dict(), "cost_us": costs}
 
 
 def holds(problem: TensionProblem, t: Array) -> bool:
@@ -281,7 +248,7 @@ def holds(problem: TensionProblem, t: Array) -> bool:
 
 def methods_table(rows: Frame) -> Frame:
     """Methods on the grid."""
-    row = row_of(rows, METHODS)
+    row = select(rows, example=METHODS).iloc[0]
     return Frame({
         "method": list(COMPARED), "poses": row["poses"], "solved": list(row["solved"].values()),
         "with a negative tension": list(row["pushing"].values()),
@@ -289,21 +256,9 @@ def methods_table(rows: Frame) -> Frame:
     })  # fmt: skip
 
 
-def row_of(rows: Frame, example: str) -> Mapping[str, Any]:
-    """The row of an example.
-
-    Raises:
-        MissingRuns: There is none.
-    """
-    mine = rows[rows["example"] == example]
-    if not len(mine):
-        raise MissingRuns(example)
-    return dict(mine.iloc[0])
-
-
 def trajectory_figure(rows: Frame) -> Figure:
     """Figures 6.2, 6.4, 6.6 of the Gazebo thesis beside 6.3, 6.5, 6.7."""
-    curves = row_of(rows, TRAJECTORY)["arrays"]
+    curves = select(rows, example=TRAJECTORY)["arrays"].iloc[0]
     title = "Trajectory of the Gazebo thesis by two programs, figures 6.2 to 6.7"
     figure, axes = new_figure(3, 2, (12.0, 11.0), title)
     labels = {
@@ -311,8 +266,9 @@ def trajectory_figure(rows: Frame) -> Figure:
     }  # fmt: skip
     programs = {"class": "trajectory class", "conditions": "second program"}
     for column, (program, words) in enumerate(programs.items()):
-        for row, (quantity, (label, factor)) in enumerate(zip(MOTION, labels.items(), strict=True)):
-            place, values = axes[row, column], curves[f"{program}_{quantity}"]
+        panels = zip(axes[:, column], MOTION, labels.items(), strict=True)
+        for place, quantity, (label, factor) in panels:
+            values = curves[f"{program}_{quantity}"]
             for k, name in enumerate("xyz"):
                 draw_curve(
                     place, curves["times_s"], values[:, k], nth_look(k), name,
@@ -327,7 +283,7 @@ def trajectory_figure(rows: Frame) -> Figure:
 
 def polygons_figure(rows: Frame) -> Figure:
     """Figure 1.19 of the servoing thesis: polygons at both poses, to the same scale."""
-    polygons = {name: row_of(rows, name) for name in POSES}
+    polygons = {name: select(rows, example=name).iloc[0] for name in POSES}
     title = "ACROBOT's feasible tensions, as figure 1.19 of the servoing thesis"
     figure, panels = new_figure(1, 2, (13.0, 6.8), title)
     corners = {name: row["arrays"]["vertices_n"] for name, row in polygons.items()}

@@ -58,7 +58,7 @@ def test_numbers_of_a_motion_by_hand():
         X = turned(0.0)
         X.set_translation([0.0, 0.0, depth])
         poses.append(X)
-    row = measured(poses, free.X_CdO, free.target, free.pinhole)
+    row = measured(poses)
     assert row["retreat_m"] == pytest.approx(0.1, abs=BY_HAND)
     np.testing.assert_allclose(row["depths_m"], [DESIRED, 0.2, 0.25, DESIRED])
     out = 0.03 * np.hypot(free.pinhole.fx, free.pinhole.fy) * (1.0 / DESIRED - 1.0 / 0.25)

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 from scipy.optimize import linprog
 
+from cdpr_drake.analyses.simulation.run_loop import LoopEnd
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.studies import tension_trials as trials
 from cdpr_drake.analyses.studies.tension_methods import GAINS, near_instability
@@ -35,6 +36,7 @@ from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
     build_tension_control,
 )
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -103,10 +105,8 @@ def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
 
 
 def test_what_is_interrupted_is_no_run(monkeypatch):
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(trials._Recorder, "__call__", interrupt)
+    end = LoopEnd(Outcome.INTERRUPTED, "", 0.0)
+    monkeypatch.setattr(trials, "advance", lambda *_: end)
     with pytest.raises(KeyboardInterrupt):
         run()
 
@@ -222,23 +222,24 @@ def test_the_printed_start_is_moved_by_the_least_amount():
     start, end = (np.array(place) - [0.0, 0.0, 0.2] for place in (THESIS_START, THESIS_END))
     path = held_path(ROBOT, start, end, HOME)
     assert not can_hold(ROBOT, start)
-    np.testing.assert_array_equal(path.end, end)
-    assert path.end_limit == path.end_shift == 0.0
+    first, last = path.ends
+    np.testing.assert_array_equal(last, end)
+    assert path.limits[1] == path.shifts[1] == 0.0
     way = (HOME - start) / np.linalg.norm(HOME - start)
-    np.testing.assert_allclose(path.start, start + path.start_shift * way)
-    assert 0.0 < path.start_limit <= path.start_shift
-    assert holds_by_linprog(start + (path.start_limit + FINE) * way)
-    assert not holds_by_linprog(start + (path.start_limit - 2.0 * FINE) * way)
+    np.testing.assert_allclose(first, start + path.shifts[0] * way)
+    assert 0.0 < path.limits[0] <= path.shifts[0]
+    assert holds_by_linprog(start + (path.limits[0] + FINE) * way)
+    assert not holds_by_linprog(start + (path.limits[0] - 2.0 * FINE) * way)
     for share in np.linspace(0.0, 1.0, 50):
-        assert holds_by_linprog(path.start + share * (path.end - path.start))
+        assert holds_by_linprog(first + share * (last - first))
 
 
 def test_a_path_that_can_be_held_stays_and_the_inside_must_be_held():
     away = HOME + np.array([0.5, 0.2, 0.3])
     path = held_path(ROBOT, HOME, away, HOME)
-    np.testing.assert_array_equal(path.start, HOME)
-    np.testing.assert_allclose(path.end, away)
-    assert path.start_shift == path.end_shift == 0.0
+    np.testing.assert_array_equal(path.ends[0], HOME)
+    np.testing.assert_allclose(path.ends[1], away)
+    assert path.shifts == (0.0, 0.0)
     with pytest.raises(InfeasibleTensionError, match="no tensions hold"):
         held_path(ROBOT, HOME, HOME, np.array(THESIS_START))
 
