@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -26,9 +26,10 @@ from cdpr_drake.analyses.studies.mobile_robot_figures import (
     TENSION_LAPS,
     THRESHOLD,
     VIEWED,
+    last_lap,
     of_views,
 )
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Row, Study
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Row, Study, select
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
@@ -62,17 +63,6 @@ where all are the same, 0 where they are all over the lap."""
 # What is run.
 
 
-@dataclass(frozen=True)
-class Way:
-    """A way to follow the tag: words, changes, most laps, the estimator's number, printed laps."""
-
-    words: str
-    changes: tuple[str, ...]
-    laps: int
-    estimator: int
-    printed: int
-
-
 PLAIN = "tension_management=null"
 ESTIMATORS = {
     "control_integration": (1, 12), "cable_lengths": (4, 2), "cable_lengths_elastic": (5, 3),
@@ -82,88 +72,69 @@ ESTIMATORS = {
 
 WAYS = {
     **{
-        f"estimator {kind}": Way(
+        f"estimator {kind}": (
             f"no known tag, estimator {number}, {kind.replace('_', ' ')}",
             (PLAIN, "estimator.known_tag=null", f"estimator.kind={kind}"), 30, number, printed,
         )
         for kind, (number, printed) in ESTIMATORS.items()
     },
-    "plain": Way("no correction", (PLAIN,), 60, 1, 29),
-    "corrected": Way("with correction", (), 700, 1, 700),
+    "plain": ("no correction", (PLAIN,), 60, 1, 29),
+    "corrected": ("with correction", (), 700, 1, 700),
 }  # fmt: skip
+"""Ways to follow the tag: words, changes, most laps, number of the estimator, printed laps."""
 
 VIEW_ANGLE = 59.4
 """Angle of view along the image's short side [deg]. Source: table A.4."""
 
 
 def view_margin(distance: float, edge: float) -> float:
-    """How far a tag in the middle of the image may go along its short side until a corner leaves it
-    [m].
-
-    Args:
-        distance: Of the tag from the camera [m].
-        edge: Of the tag, parallel to the image [m].
-    """
+    """How far a tag of this edge, parallel to the image and in its middle, may go along its short
+    side until a corner leaves it [m]; distance from the camera [m]."""
     return distance * math.tan(math.radians(VIEW_ANGLE / 2.0)) - edge / 2.0
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A choice of what is not printed.
-
-    Attributes:
-        name: What names of its configurations begin with.
-        words: The same for tables.
-        changes: Of the scenario.
-        friction: Of the winches over that of the robot's file.
-        margin: See `view_margin`; that of the scenario, 60 mm at 0.30 m [m].
-    """
-
-    name: str
-    words: str = ""
-    changes: tuple[str, ...] = ()
-    friction: float = 1.0
-    margin: float = view_margin(0.30, 0.06)
+CHOSEN_MARGIN = view_margin(0.30, 0.06)
+"""That of the scenario [m]."""
 
 
-def track(name: str, length: float, width: float, radius: float) -> Choice:
+def track(length: float, width: float, radius: float) -> dict[str, Any]:
     """Another track [m]."""
     sides = {"length": length, "width": width, "corner_radius": radius}
     changes = tuple(f"target.motion.mobile_robot.{side}={size:g}" for side, size in sides.items())
-    return Choice(name, f"track {length:.2f} x {width:.2f} m", changes)
+    return {"words": f"track {length:.2f} x {width:.2f} m", "changes": changes}
 
 
-def view(distance: float, edge: float) -> Choice:
-    """A tag of another edge, followed at another distance [m]; it keeps its height."""
-    changes = (
-        f"target.size={edge:g}",
-        f"desired={{position: [0, 0, {distance:g}], angles_deg: [180, 0, 180]}}",
-        f"initial_pose={{position: [0.0, -0.08, {distance + 0.04:g}]}}",  # near its middle
-    )
-    name = f"view {distance:.2f} m, {1e3 * edge:.0f} mm"
-    return Choice(name, name, changes, margin=view_margin(distance, edge))
-
-
-VARIED = (
-    track("track smaller", 0.2, 0.12, 0.04),
-    track("track larger", 0.29, 0.18, 0.06),
-    Choice("friction none", "no friction", friction=0.0),
-    Choice("friction more", "friction x 3", friction=3.0),
-    *(
-        Choice(name, words, (f"perturbations.winch_{change}",))
+VARIED: dict[str, dict[str, Any]] = {
+    "track smaller": track(0.2, 0.12, 0.04),
+    "track larger": track(0.29, 0.18, 0.06),
+    "friction none": {"words": "no friction", "friction": 0.0},
+    "friction more": {"words": "friction x 3", "friction": 3.0},
+    **{
+        name: {"words": words, "changes": (f"perturbations.winch_{change}",)}
         for name, words, change in (
             ("offset less", "winches run off by 0.5 mm/s", "offset=0.0005"),
             ("offset more", "winches run off by 2 mm/s", "offset=0.002"),
             ("spread less", "+- 0.1 mm/s", "offset_spread=0.0001"),
             ("spread more", "+- 0.4 mm/s", "offset_spread=0.0004"),
         )
-    ),
-)
-"""What is not printed, less and more than chosen."""
+    },
+}
+"""What is not printed, less and more than chosen: arguments of `case_of`."""
 
-VIEWS = (view(0.20, 0.06), view(0.20, 0.09), view(0.16, 0.03), view(0.16, 0.06))
+VIEWS: dict[str, dict[str, Any]] = {
+    (words := f"view {distance:.2f} m, {1e3 * edge:.0f} mm"): {
+        "words": words,
+        "changes": (
+            f"target.size={edge:g}",
+            f"desired={{position: [0, 0, {distance:g}], angles_deg: [180, 0, 180]}}",
+            f"initial_pose={{position: [0.0, -0.08, {distance + 0.04:g}]}}",  # near its middle
+        ),
+        "margin": view_margin(distance, edge),
+    }
+    for distance, edge in ((0.20, 0.06), (0.20, 0.09), (0.16, 0.03), (0.16, 0.06))
+}
 """Neither distance nor size of the tag is printed: 0.16 m is the distance of case I, 0.20 m the
-nearest at which the lens focuses, table A.4."""
+nearest at which the lens focuses, table A.4; the tag keeps its height."""
 
 VARIED_LAPS, QUICK_LAPS = 60, 2
 
@@ -171,30 +142,32 @@ VARIED_LAPS, QUICK_LAPS = 60, 2
 def cases(form: Form) -> Iterator[Case]:
     """All configurations, or the few of the quick form for two laps."""
     for name in ("estimator cable_lengths", "plain", "corrected") if form.quick else WAYS:
-        yield case_of(form, name, Choice(AS_CHOSEN))
+        yield case_of(form, name)
     if form.quick:
         return
-    for choice in VARIED:
-        for name in ("plain", "corrected", *VIEWED[1:]):
-            yield case_of(form, name, choice)
-    for choice in VIEWS:
-        for name in VIEWED:
-            yield case_of(form, name, choice)
+    for choices, names in ((VARIED, ("plain", "corrected", *VIEWED[1:])), (VIEWS, VIEWED)):
+        for (choice, more), name in product(choices.items(), names):
+            yield case_of(form, name, choice, **more)
 
 
-def case_of(form: Form, name: str, choice: Choice) -> Case:
-    """A way to follow the tag under a choice."""
-    way, chosen = WAYS[name], choice.name == AS_CHOSEN
-    laps = QUICK_LAPS if form.quick else way.laps if chosen else min(way.laps, VARIED_LAPS)
-    short = f"estimator {way.estimator}" if name.startswith("estimator") else name
+def case_of(
+    form: Form, name: str, choice: str = AS_CHOSEN, *, words: str = "",
+    changes: tuple[str, ...] = (), friction: float = 1.0, margin: float = CHOSEN_MARGIN,
+) -> Case:  # fmt: skip
+    """A way to follow the tag under a choice of what is not printed: its words, changes of the
+    scenario, times the friction of the winches of the robot's file, and the view's margin [m]."""
+    way, more, laps, estimator, printed = WAYS[name]
+    configuration = name
+    if choice != AS_CHOSEN:
+        configuration, laps = f"{choice}, {name}", min(laps, VARIED_LAPS)
+        way = f"{words}, {f'estimator {estimator}' if name.startswith('estimator') else name}"
+    laps = QUICK_LAPS if form.quick else laps
     keys = {
-        "configuration": name if chosen else f"{choice.name}, {name}",
-        "words": way.words if chosen else f"{choice.words}, {short}",
-        "asked_laps": laps, "friction": choice.friction,
-        "way": name, "choice": choice.name, "estimator": way.estimator,
-        "printed_laps": way.printed, "margin_m": choice.margin,
+        "configuration": configuration, "words": way, "asked_laps": laps, "friction": friction,
+        "way": name, "choice": choice, "estimator": estimator, "printed_laps": printed,
+        "margin_m": margin,
     }  # fmt: skip
-    call = partial(follow, (*choice.changes, *way.changes), laps, choice.friction)
+    call = partial(follow, (*changes, *more), laps, friction)
     return Case(keys=keys, call=call, seeds=form.times(10))
 
 
@@ -268,65 +241,50 @@ def lap_curves(result: RunResult, laps: int, lap_time: float) -> dict[str, Array
     """
     log = result.log
     times, poses, estimates = log["time"], log["X_WP"], log["X_WP_estimated"]
-    sums, tensions = np.sum(log["unstrained_lengths"], axis=1), log["tensions"]
+    positions, tensions, slack = poses[:, 4:], log["tensions"], slack_cables(result)
     distance, angle = pose_rows_distance(poses, estimates)
-    positions, high = poses[:, 4:], estimates[:, 6] - poses[:, 6]
-    visible, slack = log["found"][:, 0], slack_cables(result)
-    under = times_beyond(times, slack > FREE)
-    near = np.sum(np.abs(tensions - THRESHOLD) < SLACK, axis=1)
     phases = (np.arange(PHASES) + 0.5) / PHASES * lap_time
-    number = np.floor(times / lap_time + 1e-9).astype(int)
 
-    def at_phases(lap: int, values: Array) -> Array:
-        """Values at moments of a lap, from 0, NaN beyond the end; shape (PHASES, ...)."""
-        when = lap * lap_time + phases
+    def at_phases(numbers: Sequence[int], values: Array) -> Array:
+        """Values at moments of laps, counted from 1, shape (laps, PHASES, ...)."""
+        when = np.add.outer((np.array(numbers) - 1) * lap_time, phases)
         columns = values.reshape(len(values), -1).T
         moments = np.array([np.interp(when, times, c, right=np.nan) for c in columns])
-        return moments.T.reshape(PHASES, *values.shape[1:])
+        return np.moveaxis(moments, 0, -1).reshape(*when.shape, *values.shape[1:])
 
-    numbers: list[dict[str, Any]] = []
-    lengths = np.full((laps, PHASES), np.nan)
-    reference = at_phases(REFERENCE - 1, positions)
-    for lap in range(min(laps, int(number[-1]) + 1)):
-        rows = np.flatnonzero(number == lap)
-        lengths[lap] = at_phases(lap, sums)
-        away = np.linalg.norm(at_phases(lap, positions) - reference, axis=1)
-        worst = rows[np.argmax(distance[rows])]
-        before = (times > times[worst] - BEFORE) & (times <= times[worst])
-        whole = np.all(np.isfinite(away))
-        numbers.append({
-            "most_slack": np.max(slack[rows]), "estimate_m": np.max(distance[rows]),
-            "estimate_rad": np.max(angle[rows]), "estimate_z_m": high[rows][-1],
-            "seen": np.mean(visible[rows]), "tension_n": np.max(tensions[rows]),
-            "path_m": np.max(away) if whole else np.nan,
-            "one_slack": np.mean(slack[rows] >= 1), "two_slack": np.mean(slack[rows] >= 2),
-            "underactuated_s": np.max(under[rows]), "at_threshold": np.mean(near[rows]),
-            "estimate_at": times[worst] / lap_time - lap,
-            "slack_at_estimate": np.max(slack[before]),
-            "path_at": phases[np.argmax(away)] / lap_time if whole else np.nan,
-        })  # fmt: skip
-    last = last_lap(result.sim_time / lap_time)
-    rest = [np.nan] * (laps - len(numbers))
+    by_lap = Frame({
+        "slack": slack, "one": slack >= 1, "two": slack >= 2, "distance": distance, "angle": angle,
+        "high": estimates[:, 6] - poses[:, 6], "seen": log["found"][:, 0],
+        "tension": np.max(tensions, axis=1), "under": times_beyond(times, slack > FREE),
+        "near": np.sum(np.abs(tensions - THRESHOLD) < SLACK, axis=1),
+    }).groupby(np.floor(times / lap_time + 1e-9).astype(int))  # fmt: skip
+    worst = by_lap["distance"].idxmax()
+    numbers = by_lap.agg(
+        most_slack=("slack", "max"), estimate_m=("distance", "max"), estimate_rad=("angle", "max"),
+        estimate_z_m=("high", "last"), seen=("seen", "mean"), tension_n=("tension", "max"),
+        one_slack=("one", "mean"), two_slack=("two", "mean"), underactuated_s=("under", "max"),
+        at_threshold=("near", "mean"),
+    ).assign(
+        estimate_at=times[worst] / lap_time - worst.index,
+        slack_at_estimate=[
+            np.max(slack[(times > time - BEFORE) & (times <= time)]) for time in times[worst]
+        ],
+    ).reindex(range(laps))  # fmt: skip
+    every, last = range(1, laps + 1), last_lap(result.sim_time / lap_time)
+    reference = at_phases([REFERENCE], positions)
+    away = np.linalg.norm(at_phases(every, positions) - reference, axis=2)
+    path, path_at = np.max(away, axis=1), phases[np.argmax(away, axis=1)] / lap_time
     return {
-        **{name: np.array([*(n[name] for n in numbers), *rest], float) for name in numbers[0]},
-        "sums_m": lengths,
-        "paths_m": np.array([at_phases(lap - 1, positions) for lap in (*SHOWN, last)]),
-        "tensions_n": np.array([at_phases(lap - 1, tensions) for lap in (*TENSION_LAPS, last)]),
-    }
-
-
-def last_lap(done: float) -> int:
-    """Number of the last whole lap, from 1, of a run that ended after so many."""
-    return max(int(done + 1e-9), 1)
+        **{name: column.to_numpy(float) for name, column in numbers.items()},
+        "path_m": path, "path_at": np.where(np.isfinite(path), path_at, np.nan),
+        "sums_m": at_phases(every, np.sum(log["unstrained_lengths"], axis=1)),
+        "paths_m": at_phases((*SHOWN, last), positions),
+        "tensions_n": at_phases((*TENSION_LAPS, last), tensions),
+    }  # fmt: skip
 
 
 def times_beyond(times: Array, beyond: np.ndarray) -> Array:
-    """For how long something has been so without a break, at each time, shape (n,) [s].
-
-    Args:
-        times: Times of rows, shape (n,) [s].
-        beyond: True if it is so in a row, shape (n,).
-    """
+    """For how long something has been so without a break, at each time [s]; all of shape (n,)."""
     last = np.maximum.accumulate(np.where(beyond, -1, np.arange(len(times))))
     since = np.where(last >= 0, times[np.maximum(last, 0)], times[0])
     return np.where(beyond, times - since, 0.0)
@@ -406,14 +364,6 @@ def lap_numbers(curves: Mapping[str, Array], done: float) -> dict[str, Any]:
 # What facts ask of several runs.
 
 
-def runs_of(rows: Frame, name: str) -> Frame:
-    """Runs of a configuration; MissingRuns if there are none."""
-    runs = rows[rows["configuration"] == name]
-    if not len(runs):
-        raise MissingRuns(name)
-    return runs
-
-
 def laps_words(runs: Frame) -> str:
     """Laps until failure of runs, such as `median 12.4 (3.9 to 20.0), 2 of 10 did not fail`."""
     laps, lasting = runs["laps_done"], int((~runs["failed"].astype(bool)).sum())
@@ -431,7 +381,7 @@ def spikes(rows: Frame) -> tuple[list[bool], str]:
     """Whether errors by lengths are largest at one place of the track, by each and of the four."""
     places, agreement, words = [], [], []
     for kind, (number, _) in list(ESTIMATORS.items())[1:]:
-        arrays = list(runs_of(rows, f"estimator {kind}")["arrays"])
+        arrays = list(select(rows, configuration=f"estimator {kind}")["arrays"])
         path, error, phase = (
             np.concatenate([laps[name] for laps in arrays])
             for name in ("path_at", "estimate_m", "estimate_at")
@@ -449,16 +399,8 @@ def spikes(rows: Frame) -> tuple[list[bool], str]:
 
 
 def laps_against_print(rows: Frame, of: str, count: int) -> Frame:
-    """Medians of laps to failure over the printed ones, a column for each way to follow the tag.
-
-    Args:
-        rows: Of some ways.
-        of: Key column of which each value has a row.
-        count: Number of these values.
-
-    Raises:
-        MissingRuns: Runs lack.
-    """
+    """Medians of laps to failure over the printed ones: a column for each way to follow the tag, a
+    row for each of `count` values of a key column; MissingRuns if runs lack."""
     shares = (rows["laps_to_failure"] / rows["printed_laps"]).groupby([rows[of], rows["way"]])
     table = shares.median().unstack()
     if len(table) < count or table.isna().any(axis=None):
@@ -501,34 +443,35 @@ def view_decides(rows: Frame) -> tuple[list[bool], str]:
 # The study.
 
 
-def worst(name: str, runs: Frame) -> float:
-    """The worst of a curve over all laps and runs; NaN if there is none."""
-    values = np.concatenate([laps[name] for laps in runs["arrays"]])
-    return over(np.min if name == "seen" else np.max, values)
-
-
 def worst_of_all(rows: Frame) -> dict[str, Any]:
-    """The worst of all laps, by configuration and curve."""
-    curves = [name for name, curve in rows["arrays"].iloc[0].items() if curve.ndim == 1]
+    """The worst of all laps of all runs, by configuration and curve; NaN if there is none."""
+    names = [name for name, curve in rows["arrays"].iloc[0].items() if curve.ndim == 1]
     return {
-        configuration: {name: worst(name, runs) for name in curves}
+        configuration: {
+            name: over(
+                np.min if name == "seen" else np.max,
+                np.concatenate([laps[name] for laps in runs["arrays"]]),
+            )
+            for name in names
+        }
         for configuration, runs in rows.groupby("configuration", sort=False)
     }
 
 
 def outcomes(rows: Frame) -> Frame:
     """What came of every configuration."""
+    worst = worst_of_all(rows)
     return Frame(
         {
             "configuration": runs["words"].iloc[0],
             "printed laps": runs["printed_laps"].iloc[0],
             "laps until failure": laps_words(runs),
-            "most slack": worst("most_slack", runs),
-            "estimate [mm]": 1e3 * worst("estimate_m", runs),
-            "estimate [deg]": np.degrees(worst("estimate_rad", runs)),
-            "tension [N]": worst("tension_n", runs),
+            "most slack": worst[name]["most_slack"],
+            "estimate [mm]": 1e3 * worst[name]["estimate_m"],
+            "estimate [deg]": np.degrees(worst[name]["estimate_rad"]),
+            "tension [N]": worst[name]["tension_n"],
         }
-        for _, runs in rows.groupby("configuration", sort=False)
+        for name, runs in rows.groupby("configuration", sort=False)
     )
 
 

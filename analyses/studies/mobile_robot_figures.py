@@ -44,6 +44,11 @@ WORDS = {"plain": "no correction", "corrected": "with correction"}
 MOMENTS = (np.arange(PHASES) + 0.5) / PHASES
 
 
+def last_lap(done: float) -> int:
+    """Number of the last whole lap, from 1, of a run that ended after so many."""
+    return max(int(done + 1e-9), 1)
+
+
 def of_views(rows: Frame) -> Frame:
     """Runs in the view of the scenario and in others, with nothing else changed."""
     views = rows["choice"].str.startswith("view") | (rows["choice"] == AS_CHOSEN)
@@ -63,21 +68,39 @@ def first_run(rows: Frame, name: str) -> tuple[Mapping[str, Array], int]:
     runs = rows[rows["configuration"] == name]
     if not len(runs):
         raise NothingToDraw
-    return runs["arrays"].iloc[0], max(int(runs["laps_done"].iloc[0] + 1e-9), 1)
+    return runs["arrays"].iloc[0], last_lap(runs["laps_done"].iloc[0])
 
 
 def laps_figure(rows: Frame) -> Figure:
     """Laps until failure, sums of lengths, slack cables, paths."""
-    figure, axes = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
-    draw_laps(axes[0, 0], rows)
-    draw_lengths(axes[0, 1], rows)
-    draw_slack(axes[1, 0], rows)
+    figure, panels = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
+    ends, lengths, slack, paths = panels.flat
+    draw_laps(ends, rows)
+    for number, (words, runs) in enumerate(by_words(rows).items()):
+        style = line_style(nth_look(number))
+        for k, curves in enumerate(runs["arrays"]):
+            sums = curves["sums_m"]
+            rise = np.fmax.reduce(sums - sums[min(1, len(sums) - 1)], axis=1)
+            lengths.plot(np.arange(1, len(rise) + 1), rise, **style, linewidth=0.9,
+                         label=words if k == 0 else None)  # fmt: skip
+        most = np.fmax.reduce([curves["most_slack"] for curves in runs["arrays"]], axis=0)
+        slack.step(np.arange(1, len(most) + 1), most, where="mid", **style, label=words)
+    slack.axhspan(FREE + 0.5, 8.2, color=SHADED.color, linewidth=0.0,
+                  label="fewer than six cables hold the platform")  # fmt: skip
+    lengths.set(ylabel="rise of the sum of lengths since lap 2 [m]",
+                title="cable that was paid out, worst moment of each lap")  # fmt: skip
+    slack.set(ylabel="most cables slack at once, of all runs", title="slack cables")
+    for axes in (lengths, slack):
+        axes.set(xlabel="lap", xscale="log")
+        plain_numbers(axes.xaxis)
+        axes.legend(loc="best")
+    slack.set_ylim(-0.2, 8.2)
     for number, (name, words) in enumerate(WORDS.items()):
         if (rows["configuration"] == name).any():
-            draw_paths(axes[1, 1], rows, name, f"{words}, ", 4 * number)
-    axes[1, 1].set(title="path of the platform, first run")
-    if axes[1, 1].get_legend_handles_labels()[0]:  # below: lost platforms go through the middle
-        axes[1, 1].legend(
+            draw_paths(paths, rows, name, f"{words}, ", 4 * number)
+    paths.set(title="path of the platform, first run")
+    if paths.get_legend_handles_labels()[0]:  # below: lost platforms go through the middle
+        paths.legend(
             loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=6.0, fontsize=8, ncols=3
         )
     return figure
@@ -89,51 +112,18 @@ def draw_laps(axes: Any, rows: Frame) -> None:
     labels = []
     for place, (way, runs) in enumerate(plain.groupby("way", sort=False)):
         ends, laps = runs["laps_done"], runs["printed_laps"].iloc[0]
-        once = place == 0
-        axes.bar(place, ends.median(), 0.6, **bar_style(nth_look(0)),
-                 label="median" if once else None)  # fmt: skip
-        axes.plot(np.full(len(ends), place), ends, linestyle="", marker="x",
-                  color=nth_look(7).color, label="a run" if once else None)  # fmt: skip
-        axes.plot([place - 0.4, place + 0.4], [laps, laps], **line_style(nth_look(1)),
-                  linewidth=2.5, label="published" if once else None)  # fmt: skip
+        shown = [
+            axes.bar(place, ends.median(), 0.6, **bar_style(nth_look(0))),
+            *axes.plot(np.full(len(ends), place), ends, "x", color=nth_look(7).color),
+            *axes.plot([place - 0.4, place + 0.4], [laps, laps], **line_style(nth_look(1)),
+                       linewidth=2.5),
+        ]  # fmt: skip
         number = runs["estimator"].iloc[0]
         labels.append(f"{number}, known tag" if way == "plain" else f"estimator {number}")
     axes.set_xticks(range(len(labels)), labels, rotation=20)
     axes.set(ylabel="laps until tracking ends", title="no correction")
     if labels:
-        axes.legend(loc="upper left")
-
-
-def over_laps(axes: Any, label: str, title: str) -> None:
-    """Axes of quantities by lap."""
-    axes.set_xscale("log")
-    plain_numbers(axes.xaxis)
-    axes.set(xlabel="lap", ylabel=label, title=title)
-    axes.legend(loc="best")
-
-
-def draw_lengths(axes: Any, rows: Frame) -> None:
-    """Largest rise of the sum of lengths over that of the first whole lap, lap by lap."""
-    for number, (words, runs) in enumerate(by_words(rows).items()):
-        for k, curves in enumerate(runs["arrays"]):
-            sums = curves["sums_m"]
-            rise = np.fmax.reduce(sums - sums[min(1, len(sums) - 1)], axis=1)
-            axes.plot(np.arange(1, len(rise) + 1), rise, **line_style(nth_look(number)),
-                      linewidth=0.9, label=words if k == 0 else None)  # fmt: skip
-    over_laps(axes, "rise of the sum of lengths since lap 2 [m]",
-              "cable that was paid out, worst moment of each lap")  # fmt: skip
-
-
-def draw_slack(axes: Any, rows: Frame) -> None:
-    """The most cables slack at once in each lap, over all runs."""
-    for number, (words, runs) in enumerate(by_words(rows).items()):
-        most = np.fmax.reduce([curves["most_slack"] for curves in runs["arrays"]], axis=0)
-        axes.step(np.arange(1, len(most) + 1), most, where="mid", **line_style(nth_look(number)),
-                  label=words)  # fmt: skip
-    axes.axhspan(FREE + 0.5, 8.2, color=SHADED.color, linewidth=0.0,
-                 label="fewer than six cables hold the platform")  # fmt: skip
-    over_laps(axes, "most cables slack at once, of all runs", "slack cables")
-    axes.set_ylim(-0.2, 8.2)
+        axes.legend(shown, ["median", "a run", "published"], loc="upper left")
 
 
 def draw_paths(axes: Any, rows: Frame, name: str, words: str = "", look: int = 0) -> None:
