@@ -144,24 +144,24 @@ def excursion_table(rows: Frame) -> Frame:
 def break_figure(rows: Frame) -> Figure:
     """Largest excursion and speed by cable, a symbol for each reaction."""
     drawn, axes = new_figure(1, 2, (12.0, 5.0), "A cable breaks: what becomes of each reaction")
-    for place, reaction in enumerate(REACTIONS):
-        runs, look = rows[rows["reaction"] == reaction], nth_look(place)
-        across = runs["cable"] + 1.0 + 0.1 * (place - 0.5 * (len(REACTIONS) - 1.0))
-        columns = 1e3 * runs["excursion_m"], runs["largest_speed_m_s"]
-        for axis, values in zip(axes, columns, strict=True):
+    for axis, column, factor, label in (
+        (axes[0], "excursion_m", 1e3, "largest excursion [mm]"),
+        (axes[1], "largest_speed_m_s", 1.0, "largest speed [m/s]"),
+    ):
+        for place, reaction in enumerate(REACTIONS):
+            runs, look = rows[rows["reaction"] == reaction], nth_look(place)
+            across = runs["cable"] + 1.0 + 0.1 * (place - 0.5 * (len(REACTIONS) - 1.0))
             axis.plot(
-                across, values, look.marker or "o", color=look.color, markerfacecolor="none",
-                label=reaction,
+                across, factor * runs[column], look.marker or "o", color=look.color,
+                markerfacecolor="none", label=reaction,
             )  # fmt: skip
-    axes[0].set(ylabel="largest excursion [mm]")
-    axes[1].set(ylabel="largest speed [m/s]")
-    for axis in axes:
-        axis.set(xlabel="cable that breaks", yscale="log")
+        axis.set(xlabel="cable that breaks", ylabel=label, yscale="log")
         axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.yaxis.set_minor_formatter(NullFormatter())
         plain_numbers(axis.yaxis)
-    handles, names = axes[0].get_legend_handles_labels()
-    drawn.legend(handles, names, loc="outside lower center", ncols=len(REACTIONS))
+    drawn.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(REACTIONS)
+    )
     return drawn
 
 
@@ -420,12 +420,10 @@ def alarm_figure(rows: Frame) -> Figure:
     for place, kind in enumerate(ALARMS):
         runs, look = rows[rows["fails"] == kind], nth_look(place)
         delays = np.sort(1e3 * runs["delay_s"].dropna().astype(float))
-        if not len(delays):
-            right.plot([], [], color=look.color, label=f"{kind}: none told")
-            continue
         right.plot(
             delays, np.arange(1, len(delays) + 1) / len(runs), look.marker or "o",
-            linestyle="-", color=look.color, markerfacecolor="none", label=kind,
+            linestyle="-", color=look.color, markerfacecolor="none",
+            label=kind if len(delays) else f"{kind}: none told",
         )  # fmt: skip
     right.set(xlabel="delay [ms]", ylabel="share of failures told by then [-]", ylim=(0.0, 1.05))
     right.legend(loc="best")
