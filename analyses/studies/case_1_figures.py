@@ -14,14 +14,12 @@ from cdpr_drake.analyses.studies.servo_figures import (
     IMAGE_AWAY,
     PLACE_ERROR,
     TURN_ERROR,
-    Draw,
     Panel,
-    bars,
-    column,
     components,
     corners_at,
     draw_estimated_paths,
     draw_positions,
+    largest_and_mean,
     layout,
     paths,
 )
@@ -69,17 +67,9 @@ def comparison(number: str, words: str, of: tuple[str, ...], platform: bool = Tr
 
 def quality(number: str, words: str, of: tuple[str, ...]) -> Drawing:
     """Figures 2.5, 2.7, 2.9 and 2.11: largest and mean distances."""
-
-    def both(label: str, quantity: str, unit: str, factor: float = 1.0) -> Draw:
-        return bars(label, {
-            "largest": column(f"{quantity}_max_{unit}", factor),
-            "mean": column(f"{quantity}_mean_{unit}", factor),
-        })  # fmt: skip
-
-    image = both("distance in the image [px]", "image", "px")
-    position, rotation = (
-        both("error [mm]", "estimate", "m", 1e3), both("error [deg]", "estimate", "rad", DEG)
-    )  # fmt: skip
+    image = largest_and_mean("distance in the image [px]", "image", "px")
+    position = largest_and_mean("error [mm]", "estimate", "m", 1e3)
+    rotation = largest_and_mean("error [deg]", "estimate", "rad", DEG)
     return layout(f"Figure {number}: {words}, mean and range over the runs", (
         (Panel(image, of, "tag's centre from its straight line", "a"),),
         (Panel(position, of, "position", "b"), Panel(rotation, of, "rotation", "b")),

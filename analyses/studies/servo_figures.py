@@ -314,6 +314,14 @@ def last(name: str, factor: float = 1.0) -> Callable[[Mapping[str, Any]], float]
     return lambda row: factor * float(row["arrays"][name][-1])
 
 
+def largest_and_mean(
+    label: str, quantity: str, unit: str, factor: float = 1.0, letters: bool = False
+) -> Draw:
+    """What draws bars of a quantity's largest and mean values."""
+    columns = {"largest": f"{quantity}_max_{unit}", "mean": f"{quantity}_mean_{unit}"}
+    return bars(label, {words: column(name, factor) for words, name in columns.items()}, letters)
+
+
 @dataclass(frozen=True)
 class Panel:
     """A panel of a printed figure; `space`: 3D axes; `times`: moments that are marked [s]."""
