@@ -184,19 +184,10 @@ STUDY = servo_study(
     repetitions=10,
     stability=THRESHOLD,
     metrics=case_10_numbers,
-    units={
-        "time_to_taut_s": "s",
-        "estimate_end_m": "mm",
-        "estimate_end_rad": "deg",
-        "winch_work_j": "J",
-        "chatter_n": "N",
-        "correction_m": "mm",
-        "c7_taut_s": "s",
-        "c3_slack_s": "s",
-        "c3_first_s": "s",
-        "c1_reading_n": "N",
-        "correcting": "",
-    },
+    columns=(
+        "time_to_taut_s", "estimate_end_m", "estimate_end_rad", "winch_work_j", "chatter_n",
+        "correction_m", "c7_taut_s", "c3_slack_s", "c3_first_s", "c1_reading_n", "correcting",
+    ),
     assumptions=(
         "Which cables are paid out is not printed: C2 and C7, whose tensions begin just below the "
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
@@ -222,4 +213,4 @@ STUDY = servo_study(
         "figure_5_25": partial(cable_layout, "Figure 5.25: cable tensions", "cable_tensions", ALL),
         "figure_5_26": ends_layout("5.26", ALL),
     },
-)
+)  # fmt: skip

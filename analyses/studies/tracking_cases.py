@@ -153,11 +153,7 @@ STUDIES = {
         ),
         rendered=("tracking",),
         metrics=tracking_numbers,
-        units={
-            "roughness_m_s": "mm/s",
-            "camera_even_mean_m": "mm",
-            "camera_even_spread_m": "mm",
-        },
+        columns=("roughness_m_s", "camera_even_mean_m", "camera_even_spread_m"),
         assumptions=(*RAISED, *COMMON),
         figures={
             "figure_4_7": paths_layout(
