@@ -434,18 +434,16 @@ PLANAR_FINE = RobotLimits(
     place=0.2, psi=10.0, error=0.5, r_bp=0.01, d_theta_bp=3.0, r_s=0.05, r_pc=0.01,
     d_theta_pc=3.0, r_B=0.004,
 )  # fmt: skip
-PLANAR_COARSE = RobotLimits(
-    place=0.2, psi=10.0, error=1.0, r_bp=0.05, d_theta_bp=5.0, r_s=0.2, r_pc=0.01,
-    d_theta_pc=10.0, r_B=0.008,
-)  # fmt: skip
+PLANAR_COARSE = replace(
+    PLANAR_FINE, error=1.0, r_bp=0.05, d_theta_bp=5.0, r_s=0.2, d_theta_pc=10.0, r_B=0.008
+)
 SPATIAL_FINE = RobotLimits(
     place=0.1, error=0.5, r_bp=0.03, d_theta_bp=3.0, r_s=0.05, r_pc=0.01, d_theta_pc=3.0,
     r_B=0.008, low=0.3, high=0.3,
 )  # fmt: skip
-SPATIAL_COARSE = RobotLimits(
-    place=0.1, error=1.0, r_bp=0.06, d_theta_bp=5.0, r_s=0.3, r_pc=0.01, d_theta_pc=10.0,
-    r_B=0.008, low=0.3, high=0.3,
-)  # fmt: skip
+SPATIAL_COARSE = replace(
+    SPATIAL_FINE, error=1.0, r_bp=0.06, d_theta_bp=5.0, r_s=0.3, d_theta_pc=10.0
+)
 """Limits of the combinations of a series, but for those that vary: errors known well, and coarsely;
 r_B of the spatial robot as printed in 3.2.2."""
 
