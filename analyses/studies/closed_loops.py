@@ -93,6 +93,9 @@ STARTS, QUICK_STARTS = 200, 2
 LEAST_DRAWN_SHARE = 1e-4
 """Smaller errors are not drawn."""
 
+THIN = {"linewidth": 0.6, "alpha": 0.6}
+"""Style of one of many curves."""
+
 LOWEST = 0.15
 """Starts keep this height, so that the tag is in front of the camera [m]."""
 
@@ -405,14 +408,16 @@ def error_figure(rows: Frame, scheme: str) -> Figure:
     """|e| of every loop of a scheme over time."""
     modes = modes_of(rows, scheme)
     figure, panels = new_figure(
-        1, len(modes), (_width(modes), 5.0),
+        1, len(modes), (max(7.0, 3.5 * len(modes)), 5.0),
         f"Feature error |e| of every closed loop, relative to its start, {scheme}",
     )  # fmt: skip
     for axes, (mode, some) in zip(np.ravel(panels), modes.items(), strict=True):
         for outcome, arrays in zip(some["outcome"], some["arrays"], strict=True):
             curve = arrays["curve"]
             share = np.maximum(curve / max(curve[0], 1e-12), LEAST_DRAWN_SHARE)
-            axes.plot(np.linspace(0.0, 1.0, len(curve)), share, **_thin(look_of(outcome)))
+            axes.plot(
+                np.linspace(0.0, 1.0, len(curve)), share, **line_style(look_of(outcome)), **THIN
+            )
         limits = (LEAST_DRAWN_SHARE, 3.0)
         axes.set(yscale="log", xlabel="time / duration of the run [-]", ylim=limits, title=mode)
     np.ravel(panels)[0].set_ylabel("|e| / |e| at the start [-]")
@@ -424,7 +429,7 @@ def path_figure(rows: Frame, scheme: str) -> Figure:
     """Paths of the platform of every loop of a scheme."""
     modes = modes_of(rows, scheme)
     figure, panels = new_figure(
-        2, len(modes), (_width(modes), 8.4),
+        2, len(modes), (max(7.0, 3.5 * len(modes)), 8.4),
         f"Paths of the platform, Po, in the world frame W, from above and from the side, {scheme}",
     )  # fmt: skip
     grid = np.reshape(panels, (2, len(modes)))
@@ -432,7 +437,7 @@ def path_figure(rows: Frame, scheme: str) -> Figure:
         for outcome, arrays in zip(some["outcome"], some["arrays"], strict=True):
             look, way = look_of(outcome), arrays["way"]
             for axes, up in zip(grid[:, column], (5, 6), strict=True):
-                axes.plot(way[:, 4], way[:, up], **_thin(look))
+                axes.plot(way[:, 4], way[:, up], **line_style(look), **THIN)
                 axes.plot(*way[0, [4, up]], look.marker, color=look.color, markersize=3)
         for axes, name in zip(grid[:, column], "yz", strict=True):
             axes.set(aspect="equal", xlabel="x in W [m]", ylabel=f"{name} in W [m]")
@@ -452,14 +457,6 @@ def modes_of(rows: Frame, scheme: str) -> dict[str, Frame]:
 def look_of(outcome: str) -> Look:
     """Look of curves by how their run ended."""
     return OUTCOMES.get(outcome, OTHER_OUTCOME)
-
-
-def _thin(look: Look) -> dict[str, Any]:
-    return line_style(look) | {"linewidth": 0.6, "alpha": 0.6}
-
-
-def _width(modes: dict[str, Frame]) -> float:
-    return max(7.0, 3.5 * len(modes))  # room for the title
 
 
 def _legend(figure: Figure, modes: dict[str, Frame]) -> None:
