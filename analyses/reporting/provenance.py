@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 from importlib import import_module
@@ -51,25 +52,27 @@ def _versions() -> dict[str, str]:
 
 @cache
 def code_version() -> str:
-    """Version of cdpr_drake and a hash of its sources and robots, but for the command line.
+    """Version of cdpr_drake and a hash of its sources and robots, but for the command line and the
+    facts that judge studies.
 
     Sweeps keep it beside their chunks, so that chunks of other code are not taken for their own.
     """
     folders = [Path(import_module(name).__path__[0]) for name in PACKAGES]
-    return f"{__version__} {hash_of_sources(folders, folders[0] / 'cli')}"
+    without = folders[0] / "cli", folders[-1] / "studies" / "facts"
+    return f"{__version__} {hash_of_sources(folders, without)}"
 
 
-def hash_of_sources(folders: list[Path], without: Path | None = None) -> str:
+def hash_of_sources(folders: list[Path], without: Collection[Path] = ()) -> str:
     """Twelve digits that change with the sources and data in folders, wherever the folders are.
 
     Args:
         folders: Some may lie in others.
-        without: A folder that does not count.
+        without: Folders that do not count.
     """
     found: dict[Path, str] = {}
     for folder in folders:  # a file counts with its place in the innermost folder
         for path in folder.rglob("*"):
-            if path.suffix in SUFFIXES and (without is None or without not in path.parents):
+            if path.suffix in SUFFIXES and not {*without} & {*path.parents}:
                 place = f"{folder.name}/{path.relative_to(folder).as_posix()}"
                 if path not in found or len(place) < len(found[path]):
                     found[path] = place

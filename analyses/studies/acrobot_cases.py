@@ -185,12 +185,7 @@ STUDIES = {
         ),
         rendered=("turned_16",),
         metrics=turned_numbers,
-        units={
-            "winding_turns": "",
-            "radius_least_px": "px",
-            "radius_end_px": "px",
-            "overshoot": "",
-        },
+        columns=("winding_turns", "radius_least_px", "radius_end_px", "overshoot"),
         assumptions=(
             "The desired state is lost in the text. The tag lies on the ground where the printed "
             "initial poses of platform and object put it; it is wanted 0.09 m below the camera, "

@@ -6,14 +6,13 @@ covariance that each reports, and what a visual servo gains from a calibrated ro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
@@ -79,6 +78,7 @@ PLACE_SIGMA, TURN_SIGMA = 2e-4, 5e-4
 
 TAG_SIZE, IMAGE = 0.06, (640, 480)
 TAG_PLACES = tuple((x, y) for x in (-0.2, 0.0, 0.2) for y in (-0.15, 0.15))
+TARGETS: dict[int, PointTarget] = {k: TagTarget(k, TAG_SIZE) for k in range(len(TAG_PLACES))}
 
 START_OFF, START_TURNED = 0.3, np.radians(20.0)
 """How far off the start of a calibration by winches is believed to be [m, rad]."""
@@ -108,42 +108,24 @@ class CameraTrial:
         result: The calibration.
         true: The true robot.
         believed: As it was believed before.
-        free: Which parameters were unknown.
+        errors: Of the unknown parameters, shape (f,).
     """
 
     result: CalibrationResult
     true: CalibrationModel
     believed: CalibrationModel
-    free: npt.NDArray[np.bool_]
-
-    def errors(self) -> Array:
-        """Of the unknown parameters, shape (f,)."""
-        return model_difference(self.result.model, self.true)[self.free]
-
-    def point_errors(self) -> tuple[float, float]:
-        """Root mean square distances of exit and anchor points from the true ones [m].
-
-        Without what moves a whole frame, which the camera hardly sees or does not see at all.
-        """
-        rest = self.result.without_frames(self.errors())
-        return (
-            _rms(rest[[".exit_point." in name for name in self.result.names]]),
-            _rms(rest[[".anchor_point." in name for name in self.result.names]]),
-        )
+    errors: Array
 
     def normalized_squares(self) -> tuple[float, float]:
         """Errors over their covariance, squared and summed: chi-square of f if it is right.
 
         Of errors with frames moved along their arcs, and of the straight differences.
         """
-        errors = self.result.errors_from(self.true), self.errors()
-        each = [e @ np.linalg.solve(self.result.covariance, e) for e in errors]
-        return float(each[0]), float(each[1])
-
-
-def _rms(values: Array) -> float:
-    """Root mean square of distances, from coordinates one after the other [m]."""
-    return float(np.sqrt(np.mean(np.sum(values.reshape(-1, 3) ** 2, axis=1))))
+        along, straight = (
+            float(errors @ np.linalg.solve(self.result.covariance, errors))
+            for errors in (self.result.errors_from(self.true), self.errors)
+        )
+        return along, straight
 
 
 def true_model() -> CalibrationModel:
@@ -155,9 +137,16 @@ def true_model() -> CalibrationModel:
     return with_tags(calibration_model(load_robot(ROBOT), MOUNT), tags)
 
 
-def _off(points: Array, distance: float, random: np.random.Generator) -> Array:
-    steps = random.standard_normal(points.shape)
-    return np.asarray(points + distance * steps / np.linalg.norm(steps, axis=0))
+def _wrong_points(
+    true: CalibrationModel, random: np.random.Generator, size: float = 1.0
+) -> CalibrationModel:
+    """The robot with exit and anchor points off."""
+    points = {}
+    for name, distance in (("p_WA", EXITS_OFF), ("p_PB", ANCHORS_OFF)):
+        right = getattr(true.cables, name)
+        steps = random.standard_normal(right.shape)
+        points[name] = right + size * distance * steps / np.linalg.norm(steps, axis=0)
+    return replace(true, cables=replace(true.cables, **points))
 
 
 @lru_cache
@@ -168,7 +157,7 @@ def designed_poses() -> tuple[RigidTransform, ...]:
     """
     random, true, robot = np.random.default_rng(0), true_model(), load_robot(ROBOT)
     candidates, _ = rest_poses(robot, CANDIDATES, random)
-    uv = simulated_corners(true, candidates, _targets(true), _pinhole(), 0.0, random)
+    uv = simulated_corners(true, candidates, TARGETS, _pinhole(), 0.0, random)
     program = CalibrationProgram(true, candidates, UNKNOWN)
     start = _lengths(true, candidates[0])
     readings = simulated_lengths(true, candidates, start, 0.0, random)
@@ -180,10 +169,6 @@ def designed_poses() -> tuple[RigidTransform, ...]:
     return tuple(candidates[k] for k in np.sort(chosen))
 
 
-def _targets(model: CalibrationModel) -> dict[int, PointTarget]:
-    return {k: TagTarget(k, TAG_SIZE) for k in model.tags}
-
-
 def _pinhole() -> Pinhole:
     return load_camera("ids_kowa").pinhole(*IMAGE)
 
@@ -193,7 +178,7 @@ def _measure(
 ) -> None:
     """Adds what the camera's trials measure, and what is known beforehand."""
     program.AddLengths(readings, size * LENGTH_SIGMA, start)
-    points = {k: target.points for k, target in _targets(program.model).items()}
+    points = {k: target.points for k, target in TARGETS.items()}
     program.AddTagCorners(points, uv, size * CORNER_SIGMA, _pinhole())
     # Directions are drawn at random, so that a coordinate has a third of the square.
     program.AddPrior(["exit_points"], size * EXITS_OFF / np.sqrt(3.0))
@@ -212,45 +197,48 @@ def camera_trial(seed: int, size: float = 1.0) -> CameraTrial:
     """
     random, true, robot = np.random.default_rng([seed, 1]), true_model(), load_robot(ROBOT)
     poses = designed_poses()
-    cables = replace(
-        true.cables,
-        p_WA=_off(true.cables.p_WA, size * EXITS_OFF, random),
-        p_PB=_off(true.cables.p_PB, size * ANCHORS_OFF, random),
-    )
+    believed = _wrong_points(true, random, size)
     X_PC = RigidTransform(
         rotation_from_vector(size * CAMERA_TURNED * random.standard_normal(3))
         @ true.X_PC.rotation(),
         true.X_PC.translation() + size * CAMERA_OFF * random.standard_normal(3),
     )
-    believed = replace(true, cables=cables, X_PC=X_PC, tags={})
+    believed = replace(believed, X_PC=X_PC, tags={})
     start = _lengths(true, poses[0])
-    targets, pinhole = _targets(true), _pinhole()
+    pinhole = _pinhole()
     readings = simulated_lengths(true, poses, start, size * LENGTH_SIGMA, random)
-    uv = simulated_corners(true, poses, targets, pinhole, size * CORNER_SIGMA, random)
+    uv = simulated_corners(true, poses, TARGETS, pinhole, size * CORNER_SIGMA, random)
     trial = CalibrationProgram(believed, [robot.home.transform()] * POSES, ())
     trial.AddLengths(readings, size * LENGTH_SIGMA, start)
     at = guessed_stations(believed, trial.terms, POSES, robot.home.transform()).poses()
-    model = with_tags(believed, guessed_tags(believed, at, targets, uv, pinhole))
-    at = poses_by_tags(model, at, targets, uv, pinhole)
+    model = with_tags(believed, guessed_tags(believed, at, TARGETS, uv, pinhole))
+    at = poses_by_tags(model, at, TARGETS, uv, pinhole)
     program = CalibrationProgram(model, at, UNKNOWN)
     _measure(program, readings, start, uv, size)
-    return CameraTrial(program.Solve(outliers=False), true, believed, program.free)
+    result = program.Solve(outliers=False)
+    return CameraTrial(result, true, believed, model_difference(result.model, true)[program.free])
 
 
 def camera_row(seed: int) -> dict[str, Any]:
     """A calibration by the camera on board.
 
     Returns:
-        exit_points_m, anchor_points_m: errors, rms; errors_chi_square, errors_chi_square_straight:
-        errors over their covariance with frames moved along arcs, and straight, and its degrees of
-        freedom; residuals_chi_square, and its.
+        exit_points_m, anchor_points_m: root mean square distances from the true ones, without what
+        moves a whole frame, which the camera hardly sees or does not see at all; errors_chi_square,
+        errors_chi_square_straight: errors over their covariance with frames moved along arcs, and
+        straight, and its degrees of freedom; residuals_chi_square, and its.
     """
     trial = camera_trial(seed)
-    exits, anchors = trial.point_errors()
     along, straight = trial.normalized_squares()
+    rest = trial.result.without_frames(trial.errors)
+    points = {
+        kind: rest[[f".{kind}." in name for name in trial.result.names]].reshape(-1, 3)
+        for kind in ("exit_point", "anchor_point")
+    }
     return {
-        "exit_points_m": exits, "anchor_points_m": anchors, "errors_chi_square": along,
-        "errors_chi_square_straight": straight, "errors_degrees": len(trial.errors()),
+        **{f"{kind}s_m": np.sqrt(np.mean(np.sum(p**2, axis=1))) for kind, p in points.items()},
+        "errors_chi_square": along, "errors_chi_square_straight": straight,
+        "errors_degrees": len(trial.errors),
         "residuals_chi_square": trial.result.chi_square,
         "residuals_degrees": trial.result.degrees,
     }  # fmt: skip
@@ -278,11 +266,7 @@ def tracker_row(seed: int) -> dict[str, Any]:
     start = _lengths(true, poses[0])
     readings = simulated_lengths(true, poses, start, LENGTH_SIGMA, random)
     tracked = simulated_poses(poses, TURN_SIGMA, PLACE_SIGMA, random)
-    cables = replace(
-        true.cables,
-        p_WA=_off(true.cables.p_WA, EXITS_OFF, random),
-        p_PB=_off(true.cables.p_PB, ANCHORS_OFF, random),
-    )
+    believed = _wrong_points(true, random)
 
     def program(model: CalibrationModel, at: list[RigidTransform]) -> CalibrationProgram:
         made = CalibrationProgram(model, at, ["exit_points", "anchor_points"])
@@ -290,7 +274,7 @@ def tracker_row(seed: int) -> dict[str, Any]:
         made.AddTrackedPoses(tracked, TURN_SIGMA, PLACE_SIGMA)
         return made
 
-    unknown = program(replace(true, cables=cables), tracked)
+    unknown = program(believed, tracked)
     result = unknown.Solve(outliers=False)
     truth = program(true, poses)
     information = truth.least_squares().normal_equations(truth.at(), 0.0).S
@@ -354,26 +338,23 @@ def straightness(trial: CameraTrial) -> dict[str, float]:
         if model is None:
             run = run_scenario(scenario)
         else:
+            X_WP = scenario.initial_pose.transform()
+            program = CalibrationProgram(model, [X_WP], ())
+            own = calibration_model(load_robot(ROBOT))
+            program.AddLengths(_lengths(own, X_WP)[None], LENGTH_SIGMA)
+            (X,) = guessed_stations(model, program.terms, 1, X_WP).poses()
             result = replace(trial.result, model=model)
             believed = calibrated_robot(load_robot(ROBOT), result, MOUNT)[0]
             with robot_reference(believed) as file:
                 scenario.perturbations.believed_robot = file
-                scenario.perturbations.initial_pose = _pose_of(model, scenario.initial_pose)
+                scenario.perturbations.initial_pose = Pose(
+                    position=np.array(X.translation()),
+                    angles_deg=np.degrees(angles_from_rotation(X.rotation())),
+                )
                 run = run_scenario(scenario)
         path_W, line = camera_path(run)
         distances[name] = float(np.max(distances_from_line(path_W, *line)))
     return distances
-
-
-def _pose_of(model: CalibrationModel, pose: Pose) -> Pose:
-    """The pose at which a robot that is believed has the true one's lengths."""
-    X_WP = pose.transform()
-    lengths = _lengths(calibration_model(load_robot(ROBOT)), X_WP)[None]
-    program = CalibrationProgram(model, [X_WP], ())
-    program.AddLengths(lengths, LENGTH_SIGMA)
-    (X,) = guessed_stations(model, program.terms, 1, X_WP).poses()
-    angles = np.degrees(angles_from_rotation(X.rotation()))
-    return Pose(position=np.array(X.translation()), angles_deg=angles)
 
 
 def _lengths(model: CalibrationModel, X_WP: RigidTransform) -> Array:
@@ -391,35 +372,30 @@ def cases(form: Form) -> Iterator[Case]:
         yield Case(keys={"kind": kind}, call=partial(call), seeds=form.times(100, 2, limit))
 
 
-def parameters(form: Form) -> Mapping[str, Any]:
-    """All that the numbers depend on but the seeds."""
-    return {
-        "robot": ROBOT, "mount": MOUNT, "poses": POSES, "candidates": CANDIDATES,
-        "start_poses": START_POSES, "unknown": UNKNOWN, "exits_off_m": EXITS_OFF,
-        "anchors_off_m": ANCHORS_OFF, "camera_off_m": CAMERA_OFF,
-        "camera_turned_rad": CAMERA_TURNED, "length_sigma_m": LENGTH_SIGMA,
-        "corner_sigma_px": CORNER_SIGMA, "place_sigma_m": PLACE_SIGMA,
-        "turn_sigma_rad": TURN_SIGMA, "tag_size_m": TAG_SIZE, "image_px": IMAGE,
-        "tag_places_m": TAG_PLACES, "start_off_m": START_OFF, "start_turned_rad": START_TURNED,
-        "length_share": LENGTH_SHARE, "tension_sigma_n": TENSION_SIGMA, "scenario": SCENARIO,
-        "changes": CHANGES,
-    }  # fmt: skip
-
-
 # What facts ask of several seeds.
 
 
+def by_degrees(squares: Any, degrees: int) -> tuple[bool, str]:
+    """Whether right covariances give such a chi-square of all seeds, and words on it, per degree of
+    freedom."""
+    ratio = np.sum(squares) / degrees
+    low, high = chi2.ppf([SURE / 2, 1 - SURE / 2], degrees) / degrees
+    return bool(low < ratio < high), f"{ratio:.3f} (accepted {low:.3f} to {high:.3f})"
+
+
 def covariance(rows: Frame) -> tuple[list[bool], str]:
-    """Errors and residuals beside covariances: chi-square per degree of freedom."""
-    camera, held, words = select(rows, kind="camera"), list[bool](), list[str]()
-    for name in ("errors", "residuals"):
-        count = camera[f"{name}_degrees"].sum()
-        ratio = camera[f"{name}_chi_square"].sum() / count
-        low, high = chi2.ppf([SURE / 2, 1 - SURE / 2], count) / count
-        held.append(bool(low < ratio < high))
-        words.append(f"{name} {ratio:.3f} (accepted {low:.3f} to {high:.3f})")
-    straight = camera["errors_chi_square_straight"].sum() / camera["errors_degrees"].sum()
-    return [all(held)], f"{', '.join(words)}; {straight:.3f} of errors along straight coordinates"
+    """Errors and residuals beside covariances."""
+    camera = select(rows, kind="camera")
+    degrees = camera["errors_degrees"].sum()
+    errors, of_errors = by_degrees(camera["errors_chi_square"], degrees)
+    residuals, of_residuals = by_degrees(
+        camera["residuals_chi_square"], camera["residuals_degrees"].sum()
+    )
+    straight = camera["errors_chi_square_straight"].sum() / degrees
+    return [errors and residuals], (
+        f"errors {of_errors}, residuals {of_residuals}; "
+        f"{straight:.3f} of errors along straight coordinates"
+    )
 
 
 def curvature(rows: Frame) -> tuple[list[bool], str]:
@@ -474,7 +450,12 @@ def figure(rows: Frame) -> Figure:
     drawn, axes = new_figure(1, 3, (16.0, 5.0), "Calibration over seeds")
     kinds = dict([*rows.groupby("kind", sort=False)])
     if "camera" in kinds:
-        _draw_points(axes[0], kinds["camera"])
+        for k, (name, limit) in enumerate(LIMITS.items()):
+            look, label = nth_look(k), f"{name} points"
+            values = np.sort(1e3 * kinds["camera"][f"{name}_points_m"])
+            axes[0].plot(values, label=label, marker="osv"[k], **line_style(look))
+            axes[0].axhline(1e3 * limit, color=look.color, linestyle=(":", "-.")[k],
+                            label=f"{label}: {1e3 * limit:g} mm")  # fmt: skip
         squares, degrees = kinds["camera"]["errors_chi_square"], kinds["camera"]["errors_degrees"]
         draw_chi_square(axes[1], squares, int(degrees.iloc[0]))
     axes[0].set(xlabel="seeds, sorted", ylabel="error, rms [mm]", title="by the camera alone")
@@ -493,17 +474,6 @@ def figure(rows: Frame) -> Figure:
     return drawn
 
 
-def _draw_points(axes: Axes, camera: Frame) -> None:
-    for k, (name, limit) in enumerate(LIMITS.items()):
-        look, label = nth_look(k), f"{name} points"
-        values = np.sort(1e3 * camera[f"{name}_points_m"])
-        axes.plot(values, label=label, marker="osv"[k], **line_style(look))
-        axes.axhline(
-            1e3 * limit, color=look.color, linestyle=(":", "-.")[k],
-            label=f"{label}: {1e3 * limit:g} mm",
-        )  # fmt: skip
-
-
 def draw_chi_square(axes: Axes, squares: Any, degrees: int) -> None:
     """Squares of errors over covariances of some seeds, beside their distribution."""
     values = np.sort(squares)
@@ -518,8 +488,18 @@ STUDY = Study(
     name="calibration",
     title="Calibration by camera, tracker and winches beside the Cramer-Rao bound",
     cases=cases,
-    parameters=parameters,
+    parameters=lambda form: {
+        "robot": ROBOT, "mount": MOUNT, "poses": POSES, "candidates": CANDIDATES,
+        "start_poses": START_POSES, "unknown": UNKNOWN, "exits_off_m": EXITS_OFF,
+        "anchors_off_m": ANCHORS_OFF, "camera_off_m": CAMERA_OFF,
+        "camera_turned_rad": CAMERA_TURNED, "length_sigma_m": LENGTH_SIGMA,
+        "corner_sigma_px": CORNER_SIGMA, "place_sigma_m": PLACE_SIGMA,
+        "turn_sigma_rad": TURN_SIGMA, "tag_size_m": TAG_SIZE, "image_px": IMAGE,
+        "tag_places_m": TAG_PLACES, "start_off_m": START_OFF, "start_turned_rad": START_TURNED,
+        "length_share": LENGTH_SHARE, "tension_sigma_n": TENSION_SIGMA, "scenario": SCENARIO,
+        "changes": CHANGES,
+    },
     finds={"covariance": covariance, "curvature": curvature, "reported": reported},
     tables={"Calibrations": table},
     figures={"calibration": figure},
-)
+)  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,8 @@ from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.servo import CAROCA_ASSUMPTION, PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     DEG,
-    Panel,
-    bars,
     cable_layout,
-    last,
-    layout,
+    ends_layout,
     paths_layout,
 )
 from cdpr_drake.analyses.studies.slack import OFF, PLAIN, experiments, slack_change, slack_numbers
@@ -170,27 +166,6 @@ def choices(rows: Frame) -> Frame:
     return Frame(found)
 
 
-def ends(number: str) -> Any:
-    """How far the estimate is off at the end, figures 5.17 and 5.26."""
-    return layout(
-        f"Figure {number}: error of the estimated pose at the end, mean and range over runs",
-        (
-            (
-                Panel(
-                    bars("error [mm]", {"at the end": last("estimate_distance", 1e3)}),
-                    ALL,
-                    "position",
-                ),
-                Panel(
-                    bars("error [deg]", {"at the end": last("estimate_angle", DEG)}),
-                    ALL,
-                    "rotation",
-                ),
-            ),
-        ),
-    )
-
-
 STUDY = servo_study(
     name="case-10",
     title="Slack cables on CAROCA, with and without tension correction",
@@ -209,19 +184,10 @@ STUDY = servo_study(
     repetitions=10,
     stability=THRESHOLD,
     metrics=case_10_numbers,
-    units={
-        "time_to_taut_s": "s",
-        "estimate_end_m": "mm",
-        "estimate_end_rad": "deg",
-        "winch_work_j": "J",
-        "chatter_n": "N",
-        "correction_m": "mm",
-        "c7_taut_s": "s",
-        "c3_slack_s": "s",
-        "c3_first_s": "s",
-        "c1_reading_n": "N",
-        "correcting": "",
-    },
+    columns=(
+        "time_to_taut_s", "estimate_end_m", "estimate_end_rad", "winch_work_j", "chatter_n",
+        "correction_m", "c7_taut_s", "c3_slack_s", "c3_first_s", "c1_reading_n", "correcting",
+    ),
     assumptions=(
         "Which cables are paid out is not printed: C2 and C7, whose tensions begin just below the "
         "threshold; C1 and C2, C7 alone, C7 and C8 are run beside them.",
@@ -245,6 +211,6 @@ STUDY = servo_study(
     figures={
         "figure_5_24": paths_layout("Figure 5.24: 2 1/2 D on CAROCA with slack cables", ALL),
         "figure_5_25": partial(cable_layout, "Figure 5.25: cable tensions", "cable_tensions", ALL),
-        "figure_5_26": ends("5.26"),
+        "figure_5_26": ends_layout("5.26", ALL),
     },
-)
+)  # fmt: skip

@@ -387,12 +387,6 @@ def simple_way_suffices(rows: Frame) -> tuple[list[bool], str]:
     return held, f"{words}; better by more than a fifth: {'; '.join(clearly) or 'none'}"
 
 
-UNITS = {
-    "time_to_taut_s": "s", "underactuated_s": "s", "estimate_end_m": "mm",
-    "estimate_end_rad": "deg", "winch_work_j": "J", "chatter_n": "N", "correction_m": "mm",
-    "least_rank_late": "", "least_margin_late": "", "least_margin_taut": "",
-}  # fmt: skip
-
 STUDY = servo_study(
     name="case-9",
     title="Slack cables on ACROBOT, with and without tension correction",
@@ -410,7 +404,10 @@ STUDY = servo_study(
     repetitions=10,
     stability=THRESHOLD,
     metrics=case_9_numbers,
-    units=UNITS,
+    columns=(
+        "time_to_taut_s", "underactuated_s", "estimate_end_m", "estimate_end_rad", "winch_work_j",
+        "chatter_n", "correction_m", "least_rank_late", "least_margin_late", "least_margin_taut",
+    ),
     assumptions=(
         "Stiffness and damping of the cables as mounted are not printed: a hundredth of the "
         "modulus of the fibre, and a retardation time of 2 ms, are fitted: the printed gain of the "
@@ -435,4 +432,4 @@ STUDY = servo_study(
     },
     tables={"Which way to take up 4 cm of slack": which_to_take},
     figures=FIGURES,
-)
+)  # fmt: skip

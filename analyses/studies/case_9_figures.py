@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,15 +12,13 @@ from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.servo_figures import (
-    DEG,
     IMAGE,
     IMAGE_AWAY,
     Panel,
-    bars,
     cable_layout,
     draw_stable,
     draw_taut,
-    last,
+    ends_layout,
     layout,
 )
 from cdpr_drake.analyses.studies.slack import (
@@ -52,16 +49,6 @@ RESIDUALS = {
     "E8": 1.63, "E9": 1.06, "E10": 1.02,
 }  # fmt: skip
 """Table 5.1 [N]."""
-
-
-def end_errors(number: str) -> Any:
-    """How far the estimate is off at the end, figures 5.17 and 5.26."""
-    position = bars("error [mm]", {"at the end": last("estimate_distance", 1e3)})
-    rotation = bars("error [deg]", {"at the end": last("estimate_angle", DEG)})
-    return layout(
-        f"Figure {number}: error of the estimated pose at the end, mean and range over runs",
-        [[Panel(position, ALL, "position"), Panel(rotation, ALL, "rotation")]],
-    )
 
 
 def polygon_figure(rows: Frame, labels: Mapping[str, str]) -> Figure:
@@ -174,7 +161,7 @@ FIGURES = {
             ]
         ],
     ),
-    "figure_5_17": end_errors("5.17"),
+    "figure_5_17": ends_layout("5.17", ALL),
     "figure_5_18": layout(
         "Figure 5.18: cables in tension, and whether the criterion of stability holds",
         [

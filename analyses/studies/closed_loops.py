@@ -16,10 +16,12 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.studies.closed_loops_figures import error_figure, path_figure
 from cdpr_drake.analyses.studies.perturbed_servo import (
     Perturbation,
     PerturbedServo,
@@ -29,6 +31,7 @@ from cdpr_drake.analyses.studies.perturbed_servo import (
     servo_case,
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
@@ -40,6 +43,7 @@ from cdpr_drake.geometry.poses import (
     pose_row,
     pose_rows_distance,
 )
+from cdpr_drake.palette import OTHER_OUTCOME, OUTCOMES, Look
 from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.stability_case import SCHEMES
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability, worst_perturbations
@@ -85,6 +89,12 @@ MANAGEMENT = "tension_management={kind: constant, threshold: [1.0], gain: 0.003}
 published one is too high."""
 
 STARTS, QUICK_STARTS = 200, 2
+
+LEAST_DRAWN_SHARE = 1e-4
+"""Smaller errors are not drawn."""
+
+THIN = {"linewidth": 0.6, "alpha": 0.6}
+"""Style of one of many curves."""
 
 LOWEST = 0.15
 """Starts keep this height, so that the tag is in front of the camera [m]."""
@@ -392,6 +402,71 @@ def managed(rows: Frame) -> tuple[list[bool], str]:
         f"{'; '.join(words) or 'no loop ends so'}; {good.sum()} and {arrived.sum()} of {len(ends)} "
         f"converge without and with it, {(good & ~arrived).sum()} without it alone"
     )
+
+
+def error_figure(rows: Frame, scheme: str) -> Figure:
+    """|e| of every loop of a scheme over time."""
+    modes = modes_of(rows, scheme)
+    figure, panels = new_figure(
+        1, len(modes), (max(7.0, 3.5 * len(modes)), 5.0),
+        f"Feature error |e| of every closed loop, relative to its start, {scheme}",
+    )  # fmt: skip
+    for axes, (mode, some) in zip(np.ravel(panels), modes.items(), strict=True):
+        for outcome, arrays in zip(some["outcome"], some["arrays"], strict=True):
+            curve = arrays["curve"]
+            share = np.maximum(curve / max(curve[0], 1e-12), LEAST_DRAWN_SHARE)
+            axes.plot(
+                np.linspace(0.0, 1.0, len(curve)), share, **line_style(look_of(outcome)), **THIN
+            )
+        limits = (LEAST_DRAWN_SHARE, 3.0)
+        axes.set(yscale="log", xlabel="time / duration of the run [-]", ylim=limits, title=mode)
+    np.ravel(panels)[0].set_ylabel("|e| / |e| at the start [-]")
+    _legend(figure, modes)
+    return figure
+
+
+def path_figure(rows: Frame, scheme: str) -> Figure:
+    """Paths of the platform of every loop of a scheme."""
+    modes = modes_of(rows, scheme)
+    figure, panels = new_figure(
+        2, len(modes), (max(7.0, 3.5 * len(modes)), 8.4),
+        f"Paths of the platform, Po, in the world frame W, from above and from the side, {scheme}",
+    )  # fmt: skip
+    grid = np.reshape(panels, (2, len(modes)))
+    for column, (mode, some) in enumerate(modes.items()):
+        for outcome, arrays in zip(some["outcome"], some["arrays"], strict=True):
+            look, way = look_of(outcome), arrays["way"]
+            for axes, up in zip(grid[:, column], (5, 6), strict=True):
+                axes.plot(way[:, 4], way[:, up], **line_style(look), **THIN)
+                axes.plot(*way[0, [4, up]], look.marker, color=look.color, markersize=3)
+        for axes, name in zip(grid[:, column], "yz", strict=True):
+            axes.set(aspect="equal", xlabel="x in W [m]", ylabel=f"{name} in W [m]")
+        grid[0, column].set_title(mode)
+    _legend(figure, modes)
+    return figure
+
+
+def modes_of(rows: Frame, scheme: str) -> dict[str, Frame]:
+    """Loops of a scheme by mode."""
+    some = rows[rows["scheme"] == scheme]
+    if not len(some):
+        raise NothingToDraw
+    return dict([*some.groupby("mode", sort=False)])
+
+
+def look_of(outcome: str) -> Look:
+    """Look of curves by how their run ended."""
+    return OUTCOMES.get(outcome, OTHER_OUTCOME)
+
+
+def _legend(figure: Figure, modes: dict[str, Frame]) -> None:
+    words = {outcome for some in modes.values() for outcome in some["outcome"]}
+    handles = [
+        Line2D([], [], marker=look_of(word).marker, label=word.replace("_", " "),
+               **line_style(look_of(word)))
+        for word in sorted(words, key=lambda word: Outcome[word.upper()])
+    ]  # fmt: skip
+    figure.legend(handles=handles, loc="outside lower center", ncols=4)
 
 
 STUDY = Study(

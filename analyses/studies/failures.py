@@ -144,24 +144,24 @@ def excursion_table(rows: Frame) -> Frame:
 def break_figure(rows: Frame) -> Figure:
     """Largest excursion and speed by cable, a symbol for each reaction."""
     drawn, axes = new_figure(1, 2, (12.0, 5.0), "A cable breaks: what becomes of each reaction")
-    for place, reaction in enumerate(REACTIONS):
-        runs, look = rows[rows["reaction"] == reaction], nth_look(place)
-        across = runs["cable"] + 1.0 + 0.1 * (place - 0.5 * (len(REACTIONS) - 1.0))
-        columns = 1e3 * runs["excursion_m"], runs["largest_speed_m_s"]
-        for axis, values in zip(axes, columns, strict=True):
+    for axis, column, factor, label in (
+        (axes[0], "excursion_m", 1e3, "largest excursion [mm]"),
+        (axes[1], "largest_speed_m_s", 1.0, "largest speed [m/s]"),
+    ):
+        for place, reaction in enumerate(REACTIONS):
+            runs, look = rows[rows["reaction"] == reaction], nth_look(place)
+            across = runs["cable"] + 1.0 + 0.1 * (place - 0.5 * (len(REACTIONS) - 1.0))
             axis.plot(
-                across, values, look.marker or "o", color=look.color, markerfacecolor="none",
-                label=reaction,
+                across, factor * runs[column], look.marker or "o", color=look.color,
+                markerfacecolor="none", label=reaction,
             )  # fmt: skip
-    axes[0].set(ylabel="largest excursion [mm]")
-    axes[1].set(ylabel="largest speed [m/s]")
-    for axis in axes:
-        axis.set(xlabel="cable that breaks", yscale="log")
+        axis.set(xlabel="cable that breaks", ylabel=label, yscale="log")
         axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.yaxis.set_minor_formatter(NullFormatter())
         plain_numbers(axis.yaxis)
-    handles, names = axes[0].get_legend_handles_labels()
-    drawn.legend(handles, names, loc="outside lower center", ncols=len(REACTIONS))
+    drawn.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=len(REACTIONS)
+    )
     return drawn
 
 
@@ -185,30 +185,22 @@ FAILURE = Study(
 
 NOTHING, BREAK, POWER, JAM = "nothing", "cable breaks", "power lost", "winch jams"
 
+EVENT = "failures.events=[{{kind: %s, time: {time:g}, %s: {which}}}]"
+FAULT = "camera.fault={{kind: %s, start: {time:g}, duration: 1000.0}}"
 ALARMS = {
-    BREAK: "found_broken",
-    JAM: "found_jammed",
-    POWER: "found_powerless",
-    "tension sensor freezes": "frozen_tension",
-    "encoder freezes": "frozen_encoder",
-    "camera goes dark": "camera_dark",
-    "image stays": "camera_late",
-}
-"""Column of the log by what fails."""
-
-EVENTS = {
-    BREAK: "{{kind: cable_breaks, time: {time:g}, cable: {which}}}",
-    JAM: "{{kind: winch_jams, time: {time:g}, winch: {which}}}",
-    POWER: "{{kind: power_lost, time: {time:g}, winch: {which}}}",
+    BREAK: ("found_broken", EVENT % ("cable_breaks", "cable")),
+    JAM: ("found_jammed", EVENT % ("winch_jams", "winch")),
+    POWER: ("found_powerless", EVENT % ("power_lost", "winch")),
     "tension sensor freezes": (
-        "{{kind: sensor_freezes, time: {time:g}, sensor: tension, cable: {which}}}"
+        "frozen_tension",
+        EVENT % ("sensor_freezes, sensor: tension", "cable"),
     ),
-    "encoder freezes": "{{kind: sensor_freezes, time: {time:g}, sensor: encoder, cable: {which}}}",
+    "encoder freezes": ("frozen_encoder", EVENT % ("sensor_freezes, sensor: encoder", "cable")),
+    "camera goes dark": ("camera_dark", FAULT % "dead"),
+    "image stays": ("camera_late", FAULT % "frozen"),
 }
-"""Event of section `failures` that it is."""
-
-FAULTS = {"camera goes dark": "dead", "image stays": "frozen"}
-"""Fault of the camera that it is."""
+"""By what fails, the column of the log that tells of it and the change of the scenario that it
+is."""
 
 UNDISTURBED, BREAKS, OTHERS = (1000, 4), (12, 1), (2, 1)
 """Undisturbed runs, and how often every cable breaks and every other failure comes, each from
@@ -246,8 +238,8 @@ SEED = 35
 def alarm_cases(form: Form) -> Iterator[Case]:
     """All failures, then undisturbed runs."""
     runs = list[tuple[str, int, int]]()
-    for fails in ALARMS:
-        count = 1 if fails in FAULTS else 2 if form.quick else 8
+    for fails, (_, change) in ALARMS.items():
+        count = (2 if form.quick else 8) if "{which}" in change else 1
         repeats = range((BREAKS if fails == BREAK else OTHERS)[form.quick])
         runs += [
             (fails, which, 100_000 + 1000 * k + which) for k in repeats for which in range(count)
@@ -269,10 +261,7 @@ def alarm_changes(fails: str, which: int, number: int) -> list[str]:
     duration = begins + AFTER
     if fails == NOTHING:
         duration = LONG if number % EVERY == 0 else SHORT
-    event = EVENTS[fails].format(time=begins, which=which) if fails in EVENTS else ""
-    fault = "null"
-    if fails in FAULTS:
-        fault = f"{{kind: {FAULTS[fails]}, start: {begins:g}, duration: 1000.0}}"
+    failure = [ALARMS[fails][1].format(time=begins, which=which)] if fails in ALARMS else []
     return [
         f"initial_pose.position={_listed(position)}",
         f"initial_pose.angles_deg={_listed(angles)}",
@@ -285,10 +274,9 @@ def alarm_changes(fails: str, which: int, number: int) -> list[str]:
         f"perturbations.anchor_points={most['anchor_points_m']:.4g}",
         f"perturbations.initial_pose_shift.distance={most['pose_m']:.4g}",
         f"perturbations.initial_pose_shift.angle_deg={most['pose_deg']:.4g}",
-        f"failures.events=[{event}]",
         "emergency={reaction: stop, delay: 1000.0, known: found, watch: {}}",
         f"seed={number}", f"duration={duration:g}", f"log_rate={RATE:g}",
-        "integration.engine=compiled", f"camera.fault={fault}",
+        "integration.engine=compiled", "camera.fault=null", "failures.events=[]", *failure,
     ]  # fmt: skip
 
 
@@ -316,7 +304,7 @@ def alarm_row(fails: str, which: int, number: int) -> dict[str, Any]:
     log, times = run.log, run.log["time"]
     begins = np.inf if fails == NOTHING else fail_time(which, number)
     before = times < begins - 0.5 / RATE
-    alarms = {kind: first_times(log[name], times) for kind, name in ALARMS.items()}
+    alarms = {kind: first_times(log[name], times) for kind, (name, _) in ALARMS.items()}
     false = {kind: int(np.sum(alarm < begins)) for kind, alarm in alarms.items()}
     after = {
         kind: float(np.min(alarm)) for kind, alarm in alarms.items()
@@ -325,7 +313,7 @@ def alarm_row(fails: str, which: int, number: int) -> dict[str, Any]:
     moment = alarms[fails][which] if fails in alarms else np.inf
     carried, others = None, 0
     if fails == BREAK:
-        flags = log[ALARMS[BREAK]]
+        flags = log[ALARMS[BREAK][0]]
         moment = named_for_good(flags[:, which], times)
         carried = float(log["tensions"][before][-1, which])
         others = int(np.sum(np.any(np.delete(flags[~before], which, axis=1) > 0.0, axis=0)))
@@ -420,12 +408,10 @@ def alarm_figure(rows: Frame) -> Figure:
     for place, kind in enumerate(ALARMS):
         runs, look = rows[rows["fails"] == kind], nth_look(place)
         delays = np.sort(1e3 * runs["delay_s"].dropna().astype(float))
-        if not len(delays):
-            right.plot([], [], color=look.color, label=f"{kind}: none told")
-            continue
         right.plot(
             delays, np.arange(1, len(delays) + 1) / len(runs), look.marker or "o",
-            linestyle="-", color=look.color, markerfacecolor="none", label=kind,
+            linestyle="-", color=look.color, markerfacecolor="none",
+            label=kind if len(delays) else f"{kind}: none told",
         )  # fmt: skip
     right.set(xlabel="delay [ms]", ylabel="share of failures told by then [-]", ylim=(0.0, 1.05))
     right.legend(loc="best")

@@ -149,7 +149,7 @@ STUDIES = {
         ),
         rendered=("camera_E1",),
         metrics=line_length,
-        units={"image_line_px": "px"},
+        columns=("image_line_px",),
         assumptions=ASSUMPTIONS,
         figures={
             **four_figures("a", 14, CAMERAS, "camera wrong"),

@@ -13,10 +13,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
-from scipy.stats import chi2
 
 from cdpr_drake.analyses.calibration.identification_campaign import (
     campaign_robots,
@@ -24,7 +22,7 @@ from cdpr_drake.analyses.calibration.identification_campaign import (
     run_dynamic_campaign,
 )
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
-from cdpr_drake.analyses.studies.calibration import SURE, draw_chi_square
+from cdpr_drake.analyses.studies.calibration import by_degrees, draw_chi_square
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
@@ -178,10 +176,8 @@ def cases(form: Form) -> Iterator[Case]:
 def covariance(rows: Frame) -> tuple[list[bool], str]:
     """Errors beside covariances: chi-square per degree of freedom."""
     squares = select(rows, kind="noise")["squares"]
-    count = len(NAMES) * len(squares)
-    ratio = squares.sum() / count
-    low, high = chi2.ppf([SURE / 2, 1 - SURE / 2], count) / count
-    return [bool(low < ratio < high)], f"{ratio:.3f} (accepted {low:.3f} to {high:.3f})"
+    held, words = by_degrees(squares, len(NAMES) * len(squares))
+    return [held], words
 
 
 def lists(rows: Frame, column: str) -> Array:
@@ -211,7 +207,15 @@ def figure(rows: Frame) -> Figure:
     kinds = dict([*rows.groupby("kind", sort=False)])
     if "noise" in kinds:
         draw_chi_square(axes[0], kinds["noise"]["squares"], len(NAMES))
-        _draw_bounds(axes[1], kinds["noise"])
+        errors, places = table(rows), np.arange(len(NAMES))
+        for shift, column, words, look in (
+            (-0.2, "error over bound", "rms error", nth_look(1)),
+            (0.2, "random over designed", "bound, random poses", nth_look(2)),
+        ):
+            axes[1].bar(places + shift, errors[column], 0.4, label=words, **bar_style(look))
+        axes[1].axhline(1.0, **line_style(BOUND))
+        axes[1].set_xticks(places, NAMES, rotation=60)
+        axes[1].margins(y=0.3)  # for the legend
     if "campaign" in kinds:
         distances = 1e3 * lists(kinds["campaign"], "tracking_m")
         for k, who in enumerate(WHO):
@@ -225,17 +229,6 @@ def figure(rows: Frame) -> Figure:
         if panel.get_legend_handles_labels()[0]:
             panel.legend()
     return drawn
-
-
-def _draw_bounds(axes: Axes, noise: Frame) -> None:
-    bounds, places = lists(noise, "bound"), np.arange(len(NAMES))
-    over = _rms(lists(noise, "errors") / bounds)
-    ratio = np.median(lists(noise, "random_bound") / bounds, axis=0)
-    axes.bar(places - 0.2, over, 0.4, label="rms error", **bar_style(nth_look(1)))
-    axes.bar(places + 0.2, ratio, 0.4, label="bound, random poses", **bar_style(nth_look(2)))
-    axes.axhline(1.0, **line_style(BOUND))
-    axes.set_xticks(places, NAMES, rotation=60)
-    axes.margins(y=0.3)  # for the legend
 
 
 STUDY = Study(

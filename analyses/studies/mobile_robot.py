@@ -8,32 +8,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.facts import MissingRuns
-from cdpr_drake.analyses.studies.mobile_robot_figures import (
-    AS_CHOSEN,
-    FIGURES,
-    FREE,
-    PHASES,
-    SHOWN,
-    TENSION_LAPS,
-    THRESHOLD,
-    VIEWED,
-    of_views,
-)
 from cdpr_drake.analyses.studies.rows import Row
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
+from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
+from cdpr_drake.analyses.visualization.figure_style import (
+    bar_style,
+    line_style,
+    new_figure,
+    plain_numbers,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.palette import BOUND, SHADED, nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -59,19 +58,30 @@ SAME_PLACE = 0.7
 """Length of the mean of unit vectors at the phases of a lap, from which they are at one place: 1
 where all are the same, 0 where they are all over the lap."""
 
+PHASES = 40
+MOMENTS = (np.arange(PHASES) + 0.5) / PHASES
+"""Moments of a lap, from 0 to 1, of which lengths, places and tensions are measured."""
+
+SHOWN, TENSION_LAPS = (1, 10, 20), (1, 2, 10, 20, 30)
+"""Laps of which the path, and tensions, are measured, beside the last whole one."""
+
+FREE = 2
+"""Cables of eight that may be slack while six hold the platform."""
+
+THRESHOLD = 1.0
+"""Tension below which the scenario corrects [N], 5.3.1."""
+
+AS_CHOSEN, KNOWN = "as chosen", ("plain", "corrected")
+"""The choice of the scenario, and ways to follow the tag with a known one in each lap."""
+
+VIEWED = (
+    "estimator control_integration", "estimator cable_lengths",
+    "estimator cable_lengths_elastic_pulleys",
+)  # fmt: skip
+"""Ways to follow the tag in other views."""
+
 
 # What is run.
-
-
-@dataclass(frozen=True)
-class Way:
-    """A way to follow the tag: words, changes, most laps, the estimator's number, printed laps."""
-
-    words: str
-    changes: tuple[str, ...]
-    laps: int
-    estimator: int
-    printed: int
 
 
 PLAIN = "tension_management=null"
@@ -83,88 +93,69 @@ ESTIMATORS = {
 
 WAYS = {
     **{
-        f"estimator {kind}": Way(
+        f"estimator {kind}": (
             f"no known tag, estimator {number}, {kind.replace('_', ' ')}",
             (PLAIN, "estimator.known_tag=null", f"estimator.kind={kind}"), 30, number, printed,
         )
         for kind, (number, printed) in ESTIMATORS.items()
     },
-    "plain": Way("no correction", (PLAIN,), 60, 1, 29),
-    "corrected": Way("with correction", (), 700, 1, 700),
+    "plain": ("no correction", (PLAIN,), 60, 1, 29),
+    "corrected": ("with correction", (), 700, 1, 700),
 }  # fmt: skip
+"""Ways to follow the tag: words, changes, most laps, number of the estimator, printed laps."""
 
 VIEW_ANGLE = 59.4
 """Angle of view along the image's short side [deg]. Source: table A.4."""
 
 
 def view_margin(distance: float, edge: float) -> float:
-    """How far a tag in the middle of the image may go along its short side until a corner leaves it
-    [m].
-
-    Args:
-        distance: Of the tag from the camera [m].
-        edge: Of the tag, parallel to the image [m].
-    """
+    """How far a tag of this edge, parallel to the image and in its middle, may go along its short
+    side until a corner leaves it [m]; distance from the camera [m]."""
     return distance * math.tan(math.radians(VIEW_ANGLE / 2.0)) - edge / 2.0
 
 
-@dataclass(frozen=True)
-class Choice:
-    """A choice of what is not printed.
-
-    Attributes:
-        name: What names of its configurations begin with.
-        words: The same for tables.
-        changes: Of the scenario.
-        friction: Of the winches over that of the robot's file.
-        margin: See `view_margin`; that of the scenario, 60 mm at 0.30 m [m].
-    """
-
-    name: str
-    words: str = ""
-    changes: tuple[str, ...] = ()
-    friction: float = 1.0
-    margin: float = view_margin(0.30, 0.06)
+CHOSEN_MARGIN = view_margin(0.30, 0.06)
+"""That of the scenario [m]."""
 
 
-def track(name: str, length: float, width: float, radius: float) -> Choice:
+def track(length: float, width: float, radius: float) -> dict[str, Any]:
     """Another track [m]."""
     sides = {"length": length, "width": width, "corner_radius": radius}
     changes = tuple(f"target.motion.mobile_robot.{side}={size:g}" for side, size in sides.items())
-    return Choice(name, f"track {length:.2f} x {width:.2f} m", changes)
+    return {"words": f"track {length:.2f} x {width:.2f} m", "changes": changes}
 
 
-def view(distance: float, edge: float) -> Choice:
-    """A tag of another edge, followed at another distance [m]; it keeps its height."""
-    changes = (
-        f"target.size={edge:g}",
-        f"desired={{position: [0, 0, {distance:g}], angles_deg: [180, 0, 180]}}",
-        f"initial_pose={{position: [0.0, -0.08, {distance + 0.04:g}]}}",  # near its middle
-    )
-    name = f"view {distance:.2f} m, {1e3 * edge:.0f} mm"
-    return Choice(name, name, changes, margin=view_margin(distance, edge))
-
-
-VARIED = (
-    track("track smaller", 0.2, 0.12, 0.04),
-    track("track larger", 0.29, 0.18, 0.06),
-    Choice("friction none", "no friction", friction=0.0),
-    Choice("friction more", "friction x 3", friction=3.0),
-    *(
-        Choice(name, words, (f"perturbations.winch_{change}",))
+VARIED: dict[str, dict[str, Any]] = {
+    "track smaller": track(0.2, 0.12, 0.04),
+    "track larger": track(0.29, 0.18, 0.06),
+    "friction none": {"words": "no friction", "friction": 0.0},
+    "friction more": {"words": "friction x 3", "friction": 3.0},
+    **{
+        name: {"words": words, "changes": (f"perturbations.winch_{change}",)}
         for name, words, change in (
             ("offset less", "winches run off by 0.5 mm/s", "offset=0.0005"),
             ("offset more", "winches run off by 2 mm/s", "offset=0.002"),
             ("spread less", "+- 0.1 mm/s", "offset_spread=0.0001"),
             ("spread more", "+- 0.4 mm/s", "offset_spread=0.0004"),
         )
-    ),
-)
-"""What is not printed, less and more than chosen."""
+    },
+}
+"""What is not printed, less and more than chosen: arguments of `case_of`."""
 
-VIEWS = (view(0.20, 0.06), view(0.20, 0.09), view(0.16, 0.03), view(0.16, 0.06))
+VIEWS: dict[str, dict[str, Any]] = {
+    (words := f"view {distance:.2f} m, {1e3 * edge:.0f} mm"): {
+        "words": words,
+        "changes": (
+            f"target.size={edge:g}",
+            f"desired={{position: [0, 0, {distance:g}], angles_deg: [180, 0, 180]}}",
+            f"initial_pose={{position: [0.0, -0.08, {distance + 0.04:g}]}}",  # near its middle
+        ),
+        "margin": view_margin(distance, edge),
+    }
+    for distance, edge in ((0.20, 0.06), (0.20, 0.09), (0.16, 0.03), (0.16, 0.06))
+}
 """Neither distance nor size of the tag is printed: 0.16 m is the distance of case I, 0.20 m the
-nearest at which the lens focuses, table A.4."""
+nearest at which the lens focuses, table A.4; the tag keeps its height."""
 
 VARIED_LAPS, QUICK_LAPS = 60, 2
 
@@ -172,30 +163,32 @@ VARIED_LAPS, QUICK_LAPS = 60, 2
 def cases(form: Form) -> Iterator[Case]:
     """All configurations, or the few of the quick form for two laps."""
     for name in ("estimator cable_lengths", "plain", "corrected") if form.quick else WAYS:
-        yield case_of(form, name, Choice(AS_CHOSEN))
+        yield case_of(form, name)
     if form.quick:
         return
-    for choice in VARIED:
-        for name in ("plain", "corrected", *VIEWED[1:]):
-            yield case_of(form, name, choice)
-    for choice in VIEWS:
-        for name in VIEWED:
-            yield case_of(form, name, choice)
+    for choices, names in ((VARIED, (*KNOWN, *VIEWED[1:])), (VIEWS, VIEWED)):
+        for (choice, more), name in product(choices.items(), names):
+            yield case_of(form, name, choice, **more)
 
 
-def case_of(form: Form, name: str, choice: Choice) -> Case:
-    """A way to follow the tag under a choice."""
-    way, chosen = WAYS[name], choice.name == AS_CHOSEN
-    laps = QUICK_LAPS if form.quick else way.laps if chosen else min(way.laps, VARIED_LAPS)
-    short = f"estimator {way.estimator}" if name.startswith("estimator") else name
+def case_of(
+    form: Form, name: str, choice: str = AS_CHOSEN, *, words: str = "",
+    changes: tuple[str, ...] = (), friction: float = 1.0, margin: float = CHOSEN_MARGIN,
+) -> Case:  # fmt: skip
+    """A way to follow the tag under a choice of what is not printed: its words, changes of the
+    scenario, times the friction of the winches of the robot's file, and the view's margin [m]."""
+    way, more, laps, estimator, printed = WAYS[name]
+    configuration = name
+    if choice != AS_CHOSEN:
+        configuration, laps = f"{choice}, {name}", min(laps, VARIED_LAPS)
+        way = f"{words}, {f'estimator {estimator}' if name.startswith('estimator') else name}"
+    laps = QUICK_LAPS if form.quick else laps
     keys = {
-        "configuration": name if chosen else f"{choice.name}, {name}",
-        "words": way.words if chosen else f"{choice.words}, {short}",
-        "asked_laps": laps, "friction": choice.friction,
-        "way": name, "choice": choice.name, "estimator": way.estimator,
-        "printed_laps": way.printed, "margin_m": choice.margin,
+        "configuration": configuration, "words": way, "asked_laps": laps, "friction": friction,
+        "way": name, "choice": choice, "estimator": estimator, "printed_laps": printed,
+        "margin_m": margin,
     }  # fmt: skip
-    call = partial(follow, (*choice.changes, *way.changes), laps, choice.friction)
+    call = partial(follow, (*changes, *more), laps, friction)
     return Case(keys=keys, call=call, seeds=form.times(10))
 
 
@@ -269,51 +262,46 @@ def lap_curves(result: RunResult, laps: int, lap_time: float) -> dict[str, Array
     """
     log = result.log
     times, poses, estimates = log["time"], log["X_WP"], log["X_WP_estimated"]
-    sums, tensions = np.sum(log["unstrained_lengths"], axis=1), log["tensions"]
+    positions, tensions, slack = poses[:, 4:], log["tensions"], slack_cables(result)
     distance, angle = pose_rows_distance(poses, estimates)
-    positions, high = poses[:, 4:], estimates[:, 6] - poses[:, 6]
-    visible, slack = log["found"][:, 0], slack_cables(result)
-    under = times_beyond(times, slack > FREE)
-    near = np.sum(np.abs(tensions - THRESHOLD) < SLACK, axis=1)
-    phases = (np.arange(PHASES) + 0.5) / PHASES * lap_time
-    number = np.floor(times / lap_time + 1e-9).astype(int)
+    phases = MOMENTS * lap_time
 
-    def at_phases(lap: int, values: Array) -> Array:
-        """Values at moments of a lap, from 0, NaN beyond the end; shape (PHASES, ...)."""
-        when = lap * lap_time + phases
+    def at_phases(numbers: Sequence[int], values: Array) -> Array:
+        """Values at moments of laps, counted from 1, shape (laps, PHASES, ...)."""
+        when = np.add.outer((np.array(numbers) - 1) * lap_time, phases)
         columns = values.reshape(len(values), -1).T
         moments = np.array([np.interp(when, times, c, right=np.nan) for c in columns])
-        return moments.T.reshape(PHASES, *values.shape[1:])
+        return np.moveaxis(moments, 0, -1).reshape(*when.shape, *values.shape[1:])
 
-    numbers: list[dict[str, Any]] = []
-    lengths = np.full((laps, PHASES), np.nan)
-    reference = at_phases(REFERENCE - 1, positions)
-    for lap in range(min(laps, int(number[-1]) + 1)):
-        rows = np.flatnonzero(number == lap)
-        lengths[lap] = at_phases(lap, sums)
-        away = np.linalg.norm(at_phases(lap, positions) - reference, axis=1)
-        worst = rows[np.argmax(distance[rows])]
-        before = (times > times[worst] - BEFORE) & (times <= times[worst])
-        whole = np.all(np.isfinite(away))
-        numbers.append({
-            "most_slack": np.max(slack[rows]), "estimate_m": np.max(distance[rows]),
-            "estimate_rad": np.max(angle[rows]), "estimate_z_m": high[rows][-1],
-            "seen": np.mean(visible[rows]), "tension_n": np.max(tensions[rows]),
-            "path_m": np.max(away) if whole else np.nan,
-            "one_slack": np.mean(slack[rows] >= 1), "two_slack": np.mean(slack[rows] >= 2),
-            "underactuated_s": np.max(under[rows]), "at_threshold": np.mean(near[rows]),
-            "estimate_at": times[worst] / lap_time - lap,
-            "slack_at_estimate": np.max(slack[before]),
-            "path_at": phases[np.argmax(away)] / lap_time if whole else np.nan,
-        })  # fmt: skip
-    last = last_lap(result.sim_time / lap_time)
-    rest = [np.nan] * (laps - len(numbers))
+    by_lap = Frame({
+        "slack": slack, "one": slack >= 1, "two": slack >= 2, "distance": distance, "angle": angle,
+        "high": estimates[:, 6] - poses[:, 6], "seen": log["found"][:, 0],
+        "tension": np.max(tensions, axis=1), "under": times_beyond(times, slack > FREE),
+        "near": np.sum(np.abs(tensions - THRESHOLD) < SLACK, axis=1),
+    }).groupby(np.floor(times / lap_time + 1e-9).astype(int))  # fmt: skip
+    worst = by_lap["distance"].idxmax()
+    numbers = by_lap.agg(
+        most_slack=("slack", "max"), estimate_m=("distance", "max"), estimate_rad=("angle", "max"),
+        estimate_z_m=("high", "last"), seen=("seen", "mean"), tension_n=("tension", "max"),
+        one_slack=("one", "mean"), two_slack=("two", "mean"), underactuated_s=("under", "max"),
+        at_threshold=("near", "mean"),
+    ).assign(
+        estimate_at=times[worst] / lap_time - worst.index,
+        slack_at_estimate=[
+            np.max(slack[(times > time - BEFORE) & (times <= time)]) for time in times[worst]
+        ],
+    ).reindex(range(laps))  # fmt: skip
+    every, last = range(1, laps + 1), last_lap(result.sim_time / lap_time)
+    reference = at_phases([REFERENCE], positions)
+    away = np.linalg.norm(at_phases(every, positions) - reference, axis=2)
+    path, path_at = np.max(away, axis=1), phases[np.argmax(away, axis=1)] / lap_time
     return {
-        **{name: np.array([*(n[name] for n in numbers), *rest], float) for name in numbers[0]},
-        "sums_m": lengths,
-        "paths_m": np.array([at_phases(lap - 1, positions) for lap in (*SHOWN, last)]),
-        "tensions_n": np.array([at_phases(lap - 1, tensions) for lap in (*TENSION_LAPS, last)]),
-    }
+        **{name: column.to_numpy(float) for name, column in numbers.items()},
+        "path_m": path, "path_at": np.where(np.isfinite(path), path_at, np.nan),
+        "sums_m": at_phases(every, np.sum(log["unstrained_lengths"], axis=1)),
+        "paths_m": at_phases((*SHOWN, last), positions),
+        "tensions_n": at_phases((*TENSION_LAPS, last), tensions),
+    }  # fmt: skip
 
 
 def last_lap(done: float) -> int:
@@ -322,12 +310,7 @@ def last_lap(done: float) -> int:
 
 
 def times_beyond(times: Array, beyond: np.ndarray) -> Array:
-    """For how long something has been so without a break, at each time, shape (n,) [s].
-
-    Args:
-        times: Times of rows, shape (n,) [s].
-        beyond: True if it is so in a row, shape (n,).
-    """
+    """For how long something has been so without a break, at each time [s]; all of shape (n,)."""
     last = np.maximum.accumulate(np.where(beyond, -1, np.arange(len(times))))
     since = np.where(last >= 0, times[np.maximum(last, 0)], times[0])
     return np.where(beyond, times - since, 0.0)
@@ -407,14 +390,6 @@ def lap_numbers(curves: Mapping[str, Array], done: float) -> dict[str, Any]:
 # What facts ask of several runs.
 
 
-def runs_of(rows: Frame, name: str) -> Frame:
-    """Runs of a configuration; MissingRuns if there are none."""
-    runs = rows[rows["configuration"] == name]
-    if not len(runs):
-        raise MissingRuns(name)
-    return runs
-
-
 def laps_words(runs: Frame) -> str:
     """Laps until failure of runs, such as `median 12.4 (3.9 to 20.0), 2 of 10 did not fail`."""
     laps, lasting = runs["laps_done"], int((~runs["failed"].astype(bool)).sum())
@@ -432,7 +407,7 @@ def spikes(rows: Frame) -> tuple[list[bool], str]:
     """Whether errors by lengths are largest at one place of the track, by each and of the four."""
     places, agreement, words = [], [], []
     for kind, (number, _) in list(ESTIMATORS.items())[1:]:
-        arrays = list(runs_of(rows, f"estimator {kind}")["arrays"])
+        arrays = list(select(rows, configuration=f"estimator {kind}")["arrays"])
         path, error, phase = (
             np.concatenate([laps[name] for laps in arrays])
             for name in ("path_at", "estimate_m", "estimate_at")
@@ -450,16 +425,8 @@ def spikes(rows: Frame) -> tuple[list[bool], str]:
 
 
 def laps_against_print(rows: Frame, of: str, count: int) -> Frame:
-    """Medians of laps to failure over the printed ones, a column for each way to follow the tag.
-
-    Args:
-        rows: Of some ways.
-        of: Key column of which each value has a row.
-        count: Number of these values.
-
-    Raises:
-        MissingRuns: Runs lack.
-    """
+    """Medians of laps to failure over the printed ones: a column for each way to follow the tag, a
+    row for each of `count` values of a key column; MissingRuns if runs lack."""
     shares = (rows["laps_to_failure"] / rows["printed_laps"]).groupby([rows[of], rows["way"]])
     table = shares.median().unstack()
     if len(table) < count or table.isna().any(axis=None):
@@ -489,6 +456,12 @@ def lengths_depend(rows: Frame) -> tuple[list[bool], str]:
     return held, laps_by_configuration(runs)
 
 
+def of_views(rows: Frame) -> Frame:
+    """Runs in the view of the scenario and in others, with nothing else changed."""
+    views = rows["choice"].str.startswith("view") | (rows["choice"] == AS_CHOSEN)
+    return rows[rows["way"].isin(VIEWED) & views]
+
+
 def view_decides(rows: Frame) -> tuple[list[bool], str]:
     """Whether all three estimators last as printed in some view; whether Est. 1, which fails in all
     views, lasts the longer the more margin there is."""
@@ -499,37 +472,227 @@ def view_decides(rows: Frame) -> tuple[list[bool], str]:
     return held, laps_by_configuration(runs.sort_values("margin_m", kind="stable"))
 
 
+# What is drawn.
+
+
+def by_words(rows: Frame) -> dict[str, Frame]:
+    """Runs with a known tag, as chosen, by words; NothingToDraw if there are none."""
+    runs = rows[rows["configuration"].isin(KNOWN)]
+    if not len(runs):
+        raise NothingToDraw
+    return dict([*runs.groupby("words", sort=False)])
+
+
+def first_run(runs: Frame) -> tuple[Mapping[str, Array], int]:
+    """Curves of a configuration's first run, and its last whole lap; NothingToDraw without runs."""
+    if not len(runs):
+        raise NothingToDraw
+    return runs["arrays"].iloc[0], last_lap(runs["laps_done"].iloc[0])
+
+
+def laps_figure(rows: Frame) -> Figure:
+    """Laps until failure, sums of lengths, slack cables, paths."""
+    figure, panels = new_figure(2, 2, (13.0, 10.0), "A tag on a mobile robot that goes round")
+    ends, lengths, slack, paths = panels.flat
+    draw_laps(ends, rows)
+    for number, (words, runs) in enumerate(by_words(rows).items()):
+        style = line_style(nth_look(number))
+        for k, curves in enumerate(runs["arrays"]):
+            sums = curves["sums_m"]
+            rise = np.fmax.reduce(sums - sums[min(1, len(sums) - 1)], axis=1)
+            lengths.plot(np.arange(1, len(rise) + 1), rise, **style, linewidth=0.9,
+                         label=words if k == 0 else None)  # fmt: skip
+        most = np.fmax.reduce([curves["most_slack"] for curves in runs["arrays"]], axis=0)
+        slack.step(np.arange(1, len(most) + 1), most, where="mid", **style, label=words)
+        draw_paths(paths, runs, f"{words}, ", 4 * number)
+    slack.axhspan(FREE + 0.5, 8.2, color=SHADED.color, linewidth=0.0,
+                  label="fewer than six cables hold the platform")  # fmt: skip
+    lengths.set(ylabel="rise of the sum of lengths since lap 2 [m]",
+                title="cable that was paid out, worst moment of each lap")  # fmt: skip
+    slack.set(ylabel="most cables slack at once, of all runs", title="slack cables")
+    for axes in (lengths, slack):
+        axes.set(xlabel="lap", xscale="log")
+        plain_numbers(axes.xaxis)
+        axes.legend(loc="best")
+    slack.set_ylim(-0.2, 8.2)
+    paths.set(title="path of the platform, first run")
+    if paths.get_legend_handles_labels()[0]:  # below: lost platforms go through the middle
+        paths.legend(
+            loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=6.0, fontsize=8, ncols=3
+        )
+    return figure
+
+
+def draw_laps(axes: Any, rows: Frame) -> None:
+    """Bars of laps until the end without correction: medians, each run, what is printed."""
+    plain = rows[(rows["choice"] == AS_CHOSEN) & (rows["way"] != "corrected")]
+    labels = []
+    for place, (way, runs) in enumerate(plain.groupby("way", sort=False)):
+        ends, laps = runs["laps_done"], runs["printed_laps"].iloc[0]
+        shown = [
+            axes.bar(place, ends.median(), 0.6, **bar_style(nth_look(0))),
+            *axes.plot(np.full(len(ends), place), ends, "x", color=nth_look(7).color),
+            *axes.plot([place - 0.4, place + 0.4], [laps, laps], **line_style(nth_look(1)),
+                       linewidth=2.5),
+        ]  # fmt: skip
+        number = runs["estimator"].iloc[0]
+        labels.append(f"{number}, known tag" if way == "plain" else f"estimator {number}")
+    axes.set_xticks(range(len(labels)), labels, rotation=20)
+    axes.set(ylabel="laps until tracking ends", title="no correction")
+    if labels:
+        axes.legend(shown, ["median", "a run", "published"], loc="upper left")
+
+
+def draw_paths(axes: Any, runs: Frame, words: str = "", look: int = 0) -> None:
+    """Paths of the platform from above in laps of the first run of a configuration."""
+    curves, last = first_run(runs)
+    laps = dict(zip((*SHOWN, last), curves["paths_m"], strict=True))
+    for number, (lap, path) in enumerate(sorted(laps.items())):
+        finite = np.all(np.isfinite(path), axis=1)
+        if np.any(finite):
+            closed = path[[*range(PHASES), 0]] if np.all(finite) else path[finite]
+            mark = nth_look(look + number)
+            axes.plot(
+                *closed[:, :2].T, **line_style(mark), label=f"{words}lap {lap}", marker=mark.marker,
+                markevery=(2 * number, 8), markerfacecolor="white", markersize=5.0,
+            )  # fmt: skip
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="x in W [m]", ylabel="y in W [m]")
+
+
+def paths_figure(rows: Frame, name: str, number: str) -> Figure:
+    """Figures 5.19 and 5.20."""
+    title = f"Figure {number}: path of the platform from above, {WAYS[name][0]}, first run"
+    figure, axes = new_figure(1, 1, (9.0, 7.6), title)
+    draw_paths(axes, rows[rows["configuration"] == name])
+    axes.legend(loc="center")
+    return figure
+
+
+def lengths_figure(rows: Frame) -> Figure:
+    """Figure 5.21: sums of lengths over single laps."""
+    title = "Figure 5.21: sum of the cable lengths during single laps, first run"
+    figure, axes = new_figure(1, 1, (11.0, 6.6), title)
+    for first, (words, runs) in zip((0, 4), by_words(rows).items(), strict=False):
+        sums = runs["arrays"].iloc[0]["sums_m"]
+        begun = np.flatnonzero(np.any(np.isfinite(sums), axis=1)) + 1
+        laps = sorted({*(lap for lap in (10, 20) if lap in begun), int(begun[-1])})
+        for number, lap in enumerate(laps, start=first):
+            draw_curve(axes, MOMENTS, sums[lap - 1], nth_look(number), f"{words}, lap {lap}",
+                       phase=phase_of(number, 8))  # fmt: skip
+    axes.set(xlabel="part of the lap [-]", ylabel="sum of the cable lengths [m]", xlim=(0.0, 1.0))
+    axes.legend(loc="best")
+    return figure
+
+
+def tensions_figure(rows: Frame, name: str, words: str, laps: tuple[int, ...]) -> Figure:
+    """Figures 2.18, 5.22 and 5.23: tensions in laps of the first run, and in its last whole one."""
+    curves, last = first_run(rows[rows["configuration"] == name])
+    tensions = curves["tensions_n"]
+    panels = {lap: tensions[TENSION_LAPS.index(lap)] for lap in laps} | {last: tensions[-1]}
+    panels = {lap: panel for lap, panel in sorted(panels.items()) if np.any(np.isfinite(panel))}
+    lines = -(-len(panels) // 2)
+    title = f"Cable tensions behind a mobile robot, {words}"
+    figure, grid = new_figure(lines, 2, (14.0, 1.8 + 3.6 * lines), title)
+    flat = list(np.ravel(grid))
+    for axes, (lap, panel) in zip(flat, panels.items(), strict=False):
+        count = panel.shape[1]
+        for k in range(count):
+            draw_curve(axes, MOMENTS, panel[:, k], nth_look(k), f"cable {k + 1}",
+                       phase=phase_of(k, count), linewidth=1.2, markersize=4.0)  # fmt: skip
+        axes.axhline(THRESHOLD, **line_style(BOUND), label="threshold of the correction")
+        axes.set_title(f"lap {lap}")
+        axes.set(xlabel="part of the lap [-]", ylabel="tension [N]", xlim=(0.0, 1.0))
+    for axes in flat[len(panels) :]:
+        axes.remove()
+    figure.legend(*flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=9)
+    return figure
+
+
+def choices_figure(rows: Frame) -> Figure:
+    """Laps until the end under other choices of what is not printed, every run."""
+    rows = rows[~rows["choice"].str.startswith("view")]
+    if (rows["choice"] == AS_CHOSEN).all():
+        raise NothingToDraw
+    title = "What the thesis does not print, at three values each"
+    figure, panels = new_figure(2, 1, (10.0, 13.0), title)
+    for axes, ways, words in (
+        (panels[0], KNOWN, "known tag each lap, control integration"),
+        (panels[1], VIEWED[1:], "no known tag, estimators by cable lengths"),
+    ):
+        groups = rows[rows["way"].isin(ways)].groupby("words", sort=False)
+        for place, (_, runs) in enumerate(groups):
+            ends, look = runs["laps_done"], nth_look(ways.index(runs["way"].iloc[0]))
+            axes.barh(place, ends.median(), 0.6, **bar_style(look))
+            axes.plot(ends, np.full(len(ends), place), linestyle="", marker="x",
+                      color=nth_look(7).color)  # fmt: skip
+        axes.set_yticks(range(len(groups)), [label for label, _ in groups])
+        axes.set_xscale("log")
+        plain_numbers(axes.xaxis)
+        axes.set_xlim(1.0, max(axes.get_xlim()[1], 40.0))
+        axes.invert_yaxis()
+        axes.set(xlabel="laps until tracking ends, or the run does (crosses: each run)")
+        axes.set_title(words, loc="right")
+    return figure
+
+
+def views_figure(rows: Frame) -> Figure:
+    """Laps until the end over how far the tag may drift in the image, by estimator."""
+    rows = of_views(rows)
+    if (rows["choice"] == AS_CHOSEN).all():
+        raise NothingToDraw
+    figure, axes = new_figure(1, 1, (9.0, 6.0), "How long the tag is followed, by its view")
+    for way, runs in rows.groupby("way", sort=False):
+        look, number = nth_look(VIEWED.index(way)), runs["estimator"].iloc[0]
+        margin, laps = 1e3 * runs["margin_m"], runs["printed_laps"].iloc[0]
+        middle = runs["laps_done"].groupby(margin).median()
+        axes.plot(middle.index, middle, marker=look.marker, label=f"estimator {number}, median",
+                  **line_style(look))  # fmt: skip
+        axes.plot(margin, runs["laps_done"], linestyle="", marker=look.marker, color=look.color,
+                  markerfacecolor="none", markersize=4)  # fmt: skip
+        axes.axhline(laps, linewidth=0.8, linestyle=":", color=look.color)
+        axes.annotate(f"published, estimator {number}", (1.01, laps),
+                      xycoords=("axes fraction", "data"), ha="left", va="center",
+                      fontsize=8)  # fmt: skip
+    axes.set(xlabel="margin of the tag along the image's short side [mm]",
+             ylabel="laps until tracking ends, or the run does (hollow: each run)",
+             ylim=(0.0, None))  # fmt: skip
+    axes.legend(loc="best")
+    return figure
+
+
 # The study.
 
 
-def worst(name: str, runs: Frame) -> float:
-    """The worst of a curve over all laps and runs; NaN if there is none."""
-    values = np.concatenate([laps[name] for laps in runs["arrays"]])
-    return over(np.min if name == "seen" else np.max, values)
-
-
 def worst_of_all(rows: Frame) -> dict[str, Any]:
-    """The worst of all laps, by configuration and curve."""
-    curves = [name for name, curve in rows["arrays"].iloc[0].items() if curve.ndim == 1]
+    """The worst of all laps of all runs, by configuration and curve; NaN if there is none."""
+    names = [name for name, curve in rows["arrays"].iloc[0].items() if curve.ndim == 1]
     return {
-        configuration: {name: worst(name, runs) for name in curves}
+        configuration: {
+            name: over(
+                np.min if name == "seen" else np.max,
+                np.concatenate([laps[name] for laps in runs["arrays"]]),
+            )
+            for name in names
+        }
         for configuration, runs in rows.groupby("configuration", sort=False)
     }
 
 
 def outcomes(rows: Frame) -> Frame:
     """What came of every configuration."""
+    worst = worst_of_all(rows)
     return Frame(
         {
             "configuration": runs["words"].iloc[0],
             "printed laps": runs["printed_laps"].iloc[0],
             "laps until failure": laps_words(runs),
-            "most slack": worst("most_slack", runs),
-            "estimate [mm]": 1e3 * worst("estimate_m", runs),
-            "estimate [deg]": np.degrees(worst("estimate_rad", runs)),
-            "tension [N]": worst("tension_n", runs),
+            "most slack": worst[name]["most_slack"],
+            "estimate [mm]": 1e3 * worst[name]["estimate_m"],
+            "estimate [deg]": np.degrees(worst[name]["estimate_rad"]),
+            "tension [N]": worst[name]["tension_n"],
         }
-        for _, runs in rows.groupby("configuration", sort=False)
+        for name, runs in rows.groupby("configuration", sort=False)
     )
 
 
@@ -564,6 +727,21 @@ STUDY = Study(
     numbers=worst_of_all,
     finds={"spikes": spikes, "lengths_depend": lengths_depend, "view_decides": view_decides},
     tables={"A tag on a mobile robot": outcomes},
-    figures=FIGURES,
+    figures={
+        "mobile_robot": laps_figure,
+        "choices": choices_figure,
+        "views": views_figure,
+        **{
+            f"tensions_{file}": partial(tensions_figure, name=name, words=words, laps=laps)
+            for file, name, words, laps in (
+                ("estimator", VIEWED[1], "figure 2.18, Est. 4, no known tag", (1, 2)),
+                ("plain", "plain", "figure 5.22, no correction", (1, 10, 20)),
+                ("corrected", "corrected", "figure 5.23, with correction", (1, 10, 30)),
+            )
+        },
+        "paths_plain": partial(paths_figure, name="plain", number="5.19"),
+        "paths_corrected": partial(paths_figure, name="corrected", number="5.20"),
+        "lengths_by_lap": lengths_figure,
+    },
     assumptions=ASSUMPTIONS,
-)
+)  # fmt: skip

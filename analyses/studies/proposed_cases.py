@@ -209,10 +209,10 @@ STUDIES = {
         rendered=("torque_4cm_exact",),
         repetitions=10,
         metrics=torque_numbers,
-        units={
-            "time_to_taut_s": "s", "slack_after_s": "s", "lowest_n": "N", "below_after_s": "s",
-            "highest_n": "N", "estimate_end_m": "mm", "chatter_n": "N",
-        },
+        columns=(
+            "time_to_taut_s", "slack_after_s", "lowest_n", "below_after_s", "highest_n",
+            "estimate_end_m", "chatter_n",
+        ),
         assumptions=(
             "The thesis proposes torque control and did not implement it: all gains are chosen.",
             "Cables, poses, slack and what is believed wrongly are those of case study IX here.",
@@ -247,10 +247,9 @@ STUDIES = {
         repetitions=10,
         stability=THRESHOLD,
         metrics=tracking_numbers,
-        units={
-            "slack_share": "%", "underactuated_s": "s", "feature_error_rms": "", "chatter_n": "N",
-            "cable_power_w": "W",
-        },
+        columns=(
+            "slack_share", "underactuated_s", "feature_error_rms", "chatter_n", "cable_power_w",
+        ),
         finds={"polygon_is_better": polygon_is_better},
         tables={"Ways to manage tensions, means over d1 to d4": ways_in_words},
         assumptions=(

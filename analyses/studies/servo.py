@@ -17,7 +17,7 @@ from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.facts import FACTORS, MissingRuns
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, unit_of
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.rendered_camera import probe_rendering
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
@@ -46,15 +46,17 @@ CAROCA_ASSUMPTION = (
 )
 """See docs/theory/reproduction.md, "The cables of CAROCA"."""
 
-METRICS = {
-    "time_s": "s", "position_error_m": "mm", "rotation_error_rad": "deg", "image_max_px": "px",
-    "image_mean_px": "px", "camera_max_m": "mm", "camera_mean_m": "mm", "estimate_max_m": "mm",
-    "estimate_max_rad": "deg", "estimate_jump_m": "mm",
-}  # fmt: skip
-"""Numbers of every run and the unit in which tables have them: time; true error at the end; largest
-and mean distance of the object's centre from its straight line in an image 1600 px wide, and of the
-camera's origin from its own; largest error of the platform's estimate, and its largest change
-between two rows of the log beside that of the true pose."""
+METRICS = (
+    "time_s", "position_error_m", "rotation_error_rad", "image_max_px", "image_mean_px",
+    "camera_max_m", "camera_mean_m", "estimate_max_m", "estimate_max_rad", "estimate_jump_m",
+)  # fmt: skip
+"""Numbers of every run: time; true error at the end; largest and mean distance of the object's
+centre from its straight line in an image 1600 px wide, and of the camera's origin from its own;
+largest error of the platform's estimate, and its largest change between two rows of the log beside
+that of the true pose."""
+
+IN_TABLES = {"m": "mm", "rad": "deg", "m/s": "mm/s"}
+"""Units in which tables have columns, by those of the columns; shares are in %."""
 
 MOMENTS = {
     "position_error_m": "end", "rotation_error_rad": "end", "image_max_px": "largest",
@@ -211,7 +213,7 @@ def outcome_words(outcomes: Iterable[str]) -> str:
 
 
 def table(
-    rows: Frame, camera: str, group: str, labels: Mapping[str, str], units: Mapping[str, str]
+    rows: Frame, camera: str, group: str, labels: Mapping[str, str], columns: Sequence[str]
 ) -> Frame:
     """Means over the runs of each configuration of an experiment.
 
@@ -223,7 +225,9 @@ def table(
         raise MissingRuns(group)
     groups = mine.groupby("configuration", sort=False)
     found = groups["outcome"].agg(outcome_words).to_frame()
-    for column, unit in units.items():
+    for column in columns:
+        unit = "%" if column.endswith("_share") else unit_of(column)
+        unit = IN_TABLES.get(unit, unit)
         means = groups[column].agg(lambda values: np.mean(np.asarray(values, float)))
         heading = (
             f"{column.rpartition('_')[0].replace('_', ' ') if unit else column} [{unit or '-'}]"
@@ -257,7 +261,7 @@ def accuracy(rows: Frame) -> dict[str, Any]:
 
 def servo_study(
     *, name: str, title: str, source: str, scenario: str, configurations: Sequence[Configuration],
-    assumptions: Sequence[str] = (), units: Mapping[str, str] | None = None,
+    assumptions: Sequence[str] = (), columns: Sequence[str] = (),
     figures: Mapping[str, Any] | None = None, finds: Mapping[str, Any] | None = None,
     tables: Mapping[str, Any] | None = None, laps: Mapping[str, float] | None = None, **how: Any,
 ) -> Study:  # fmt: skip
@@ -266,7 +270,7 @@ def servo_study(
     Args:
         name, title, source, assumptions, finds, tables: As of `Study`.
         scenario, configurations, how: As of `servo_cases`.
-        units: Units in tables of the study's own numbers.
+        columns: The study's own numbers that tables have.
         figures: Its own, beside those of each experiment; these see projected images alone.
         laps: Time of a lap of experiments behind an object that runs in laps [s].
     """
@@ -298,7 +302,7 @@ def servo_study(
         moments=MOMENTS,
         tables={
             f"{group or title}; {words}": partial(
-                table, camera=camera, group=group, labels=labels, units={**METRICS, **(units or {})}
+                table, camera=camera, group=group, labels=labels, columns=(*METRICS, *columns)
             )
             for group in groups
             for camera, words in cameras.items()

@@ -111,30 +111,28 @@ def over_time(
 
 
 def components(value: str, factor: float = 1.0) -> Draw:
-    """What draws a curve for each component of a quantity of one configuration."""
+    """What draws a curve for each component of a quantity of one configuration: features with their
+    units, or cables."""
 
     def draw(axes: Any, shown: Sequence[Shown]) -> None:
-        values, names = shown[0].curve(value), component_names(shown[0], value)
+        one, label = shown[0], "cable velocity [mm/s]"
+        if value == "error":
+            parts = [name.partition("_") for name in one.run["features"]]
+            names = [
+                f"{a} [{unit}]" if unit in ("rad", "m") else f"{a}{_}{unit} [-]"
+                for a, _, unit in parts
+            ]
+            units = dict.fromkeys(name.rpartition("[")[2].rstrip("]") for name in names)
+            label = f"feature error [{', '.join(units)}]"
+        else:
+            names = [cable.name for cable in load_robot(one.run["summary"]["robot"]).cables]
         for k, name in enumerate(names):
-            draw_curve(axes, shown[0].curve("time"), values[:, k], nth_look(k), name, scale=factor,
-                       phase=phase_of(k, len(names)), linewidth=1.0, markersize=4.0)  # fmt: skip
-        units = dict.fromkeys(name.rpartition("[")[2].rstrip("]") for name in names)
-        label = (
-            "cable velocity [mm/s]" if value != "error" else f"feature error [{', '.join(units)}]"
-        )
+            draw_curve(axes, one.curve("time"), one.curve(value)[:, k], nth_look(k), name,
+                       scale=factor, phase=phase_of(k, len(names)), linewidth=1.0,
+                       markersize=4.0)  # fmt: skip
         axes.set(xlabel="time [s]", ylabel=label)
 
     return draw
-
-
-def component_names(one: Shown, value: str) -> list[str]:
-    """Features with their units, or cables."""
-    if value != "error":
-        return [cable.name for cable in load_robot(one.run["summary"]["robot"]).cables]
-    parts = [name.partition("_") for name in one.run["features"]]
-    return [
-        f"{a} [{unit}]" if unit in ("rad", "m") else f"{a}{_}{unit} [-]" for a, _, unit in parts
-    ]
 
 
 def path(axes: Any, points: Array, look: Look, label: str) -> None:
@@ -158,22 +156,16 @@ def paths(value: str, line: str = "", flat: bool = False) -> Draw:
 
     def draw(axes: Any, shown: Sequence[Shown]) -> None:
         points = []
-        for k, one in enumerate(shown):
+        for one in shown:
             mine = one.curve(value)[:, : 2 if flat else None]
             path(axes, mine, one.look, one.label)
             points.append(mine)
             if line:
                 goal, style = one.curve(line), line_style(IDEAL) | {"linewidth": 1.0, "zorder": 0}
                 if has_line(one):
-                    axes.plot(*goal.T, **style, label=_once(k, "straight line"))
-                axes.plot(
-                    *goal[1:2].T,
-                    DESIRED.marker,
-                    color=DESIRED.color,
-                    markersize=11,
-                    zorder=5,
-                    label=_once(k, "desired"),
-                )
+                    axes.plot(*goal.T, **style, label="straight line")
+                axes.plot(*goal[1:2].T, DESIRED.marker, color=DESIRED.color, markersize=11,
+                          zorder=5, label="desired")  # fmt: skip
                 points.append(goal)
         if hasattr(axes, "get_zlim"):
             fit_box(axes, np.vstack(points))
@@ -201,9 +193,9 @@ def draw_corner_paths(axes: Any, shown: Sequence[Shown]) -> None:
     for k in range(4):
         look = nth_look(k)
         path(axes, corners[:, k], look, f"point {k + 1}")
-        axes.plot(*corners[-1, k], "x", color=look.color, markersize=7, label=_once(k, "end"))
+        axes.plot(*corners[-1, k], "x", color=look.color, markersize=7, label="end")
         axes.plot(*goals[k], DESIRED.marker, color=DESIRED.color, markersize=10,
-                  markerfacecolor="none", label=_once(k, "desired"))  # fmt: skip
+                  markerfacecolor="none", label="desired")  # fmt: skip
     image_frame(axes, shown[0])
 
 
@@ -235,23 +227,13 @@ def draw_estimated_paths(axes: Any, shown: Sequence[Shown]) -> None:
 def draw_positions(axes: Any, shown: Sequence[Shown]) -> None:
     """True and estimated place of the platform over time, by coordinate."""
     for k, axis in enumerate("xyz"):
-        look, times = nth_look(k), shown[0].curve("time")
-        draw_curve(
-            axes,
-            times,
-            shown[0].curve("platform_path")[:, k],
-            Look(look.color),
-            f"{axis}, measured",
-        )
-        draw_curve(
-            axes,
-            times,
-            shown[0].curve("estimate_path")[:, k],
-            Look("#303030", ":", look.marker),
-            f"{axis}, estimated",
-            phase=phase_of(k, 3),
-            linewidth=1.6,
-        )
+        look = nth_look(k)
+        for curve, words, style, width in (
+            ("platform_path", "measured", Look(look.color), 1.4),
+            ("estimate_path", "estimated", Look("#303030", ":", look.marker), 1.6),
+        ):
+            draw_curve(axes, shown[0].curve("time"), shown[0].curve(curve)[:, k], style,
+                       f"{axis}, {words}", phase=phase_of(k, 3), linewidth=width)  # fmt: skip
     axes.set(xlabel="time [s]", ylabel="position of the platform [m]")
 
 
@@ -278,13 +260,13 @@ def draw_stable(axes: Any, shown: Sequence[Shown]) -> None:
 def draw_final_places(axes: Any, shown: Sequence[Shown]) -> None:
     """Where the camera of each run ends as seen from above, against where it should."""
     for one in shown:
-        for k, arrays in enumerate(one.rows["arrays"]):
+        for arrays in one.rows["arrays"]:
             end, goal = map(pose_from_row, arrays["camera_ends"])
             away = 1e3 * (end.translation() - goal.translation())
             turn = end.rotation().matrix()[:2, 0]
             axes.quiver(*away[:2], *turn, angles="xy", color=one.look.color, width=0.006, scale=9.0)
             axes.plot(*away[:2], one.look.marker, color=one.look.color, markerfacecolor="white",
-                      markersize=8, label=_once(k, "end of a run, with its x axis"))  # fmt: skip
+                      markersize=8, label="end of a run, with its x axis")  # fmt: skip
     axes.plot(0.0, 0.0, DESIRED.marker, color=DESIRED.color, markersize=14, label="desired")
     axes.set(xlabel="x from the goal [mm]", ylabel="y from the goal [mm]")
     axes.margins(0.3)  # for the arrows, of which the limits know the feet only
@@ -297,7 +279,7 @@ def bars(
     """What draws bars: means over the runs, with their range as whiskers."""
 
     def draw(axes: Any, shown: Sequence[Shown]) -> None:
-        width = 0.8 / len(values)
+        width, several = 0.8 / len(values), len(values) > 1
         for k, (words, value) in enumerate(values.items()):
             for place, one in enumerate(shown):
                 some = np.array([value(row) for row in one.rows.to_dict("records")], float)
@@ -305,16 +287,9 @@ def bars(
                     continue
                 mean = float(some.mean())
                 whiskers = np.maximum([[mean - some.min()], [some.max() - mean]], 0.0)
-                look = nth_look(4 * k) if len(values) > 1 or letters else one.look
-                axes.bar(
-                    place + (k + 0.5) * width - 0.4,
-                    mean,
-                    width,
-                    yerr=whiskers,
-                    capsize=3,
-                    label=_once(place, words) if len(values) > 1 else None,
-                    **bar_style(look),
-                )
+                look = nth_look(4 * k) if several or letters else one.look
+                axes.bar(place + (k + 0.5) * width - 0.4, mean, width, yerr=whiskers, capsize=3,
+                         label=words if several else None, **bar_style(look))  # fmt: skip
         names = [
             f"{chr(ord('A') + k)}: {one.label}" if letters else one.label
             for k, one in enumerate(shown)
@@ -337,6 +312,14 @@ def column(name: str, factor: float = 1.0) -> Callable[[Mapping[str, Any]], floa
 def last(name: str, factor: float = 1.0) -> Callable[[Mapping[str, Any]], float]:
     """The last number of a curve, times a factor."""
     return lambda row: factor * float(row["arrays"][name][-1])
+
+
+def largest_and_mean(
+    label: str, quantity: str, unit: str, factor: float = 1.0, letters: bool = False
+) -> Draw:
+    """What draws bars of a quantity's largest and mean values."""
+    columns = {"largest": f"{quantity}_max_{unit}", "mean": f"{quantity}_mean_{unit}"}
+    return bars(label, {words: column(name, factor) for words, name in columns.items()}, letters)
 
 
 @dataclass(frozen=True)
@@ -394,6 +377,16 @@ PLACE_ERROR = over_time("distance of the estimate [mm]", "estimate_distance", 1e
 TURN_ERROR = over_time("angle of the estimate [deg]", "estimate_angle", DEG)
 
 
+def ends_layout(number: str, of: tuple[str, ...]) -> Callable[..., Figure]:
+    """How far the estimate is off at the end, figures 5.17 and 5.26."""
+    position = bars("error [mm]", {"at the end": last("estimate_distance", 1e3)})
+    rotation = bars("error [deg]", {"at the end": last("estimate_angle", DEG)})
+    return layout(
+        f"Figure {number}: error of the estimated pose at the end, mean and range over runs",
+        [[Panel(position, of, "position"), Panel(rotation, of, "rotation")]],
+    )
+
+
 def paths_layout(title: str, of: tuple[str, ...]) -> Callable[..., Figure]:
     """Paths in the image and in space, each beside its distance from the straight line: (a) to (d),
     as figures 3.39, 4.3 to 4.5, 4.7 and 5.24 of the servoing thesis."""
@@ -411,16 +404,26 @@ def each(draw: Draw, of: Sequence[str], columns: int = 3) -> list[list[Panel]]:
     return [panels[k : k + columns] for k in range(0, len(panels), columns)]
 
 
+def tiles(
+    count: int, columns: int, size: tuple[float, float], title: str, sharex: bool = False
+) -> tuple[Figure, list[Any]]:
+    """A figure of so many panels, and these: so many side by side, each of a size [inch]."""
+    lines = -(-count // columns)
+    drawn = bare_figure((max(size[0] * columns, 8.0), size[1] * lines + 1.4), title)
+    grid = list(drawn.subplots(lines, columns, squeeze=False, sharex=sharex).flat)
+    for number, axes in enumerate(grid):
+        axes.grid(alpha=0.3)
+        if number >= count:
+            axes.remove()
+    return drawn, grid[:count]
+
+
 QUANTITIES = {
     "cable_lengths": ("unstrained_lengths", "cable length [m]", 1.0),
     "cable_tensions": ("measured_tensions", "tension [N]", 1.0),
     "velocities": ("cable_velocities", "cable velocity [mm/s]", 1e3),
 }
 """Figures with a panel for each cable: curve, label, factor."""
-
-
-def _of_cable(one: Shown, name: str, k: int) -> Array:
-    return np.asarray(one.curve(name)[:, k])
 
 
 def cable_layout(
@@ -431,48 +434,34 @@ def cable_layout(
     shown = shown_of(rows, of, labels)
     if any(name not in one for one in shown):
         raise NothingToDraw
+    known = [one.curve("tension_thresholds")[-1] for one in shown if "tension_thresholds" in one]
     cables = load_robot(shown[0].run["summary"]["robot"]).cables
-    lines = -(-len(cables) // 2)
-    drawn = bare_figure((14.0, 2.6 * lines + 2.2), title)
-    grid: Any = drawn.subplots(lines, 2, squeeze=False, sharex=True)
-    for k, (axes, cable) in enumerate(zip(grid.flat, cables, strict=False)):
-        of_cable = partial(_of_cable, name=name, k=k)
+    drawn, panels = tiles(len(cables), 2, (7.0, 2.8), title, sharex=True)
+    for k, (axes, cable) in enumerate(zip(panels, cables, strict=True)):
+
+        def of_cable(one: Shown, k: int = k) -> Array:
+            return np.asarray(one.curve(name)[:, k])
+
         over_time(label, of_cable, factor, linewidth=1.0, markersize=4.0)(axes, shown)
-        known = [one for one in shown if "tension_thresholds" in one]
         if quantity == "cable_tensions" and known:
-            axes.axhline(
-                known[0].curve("tension_thresholds")[-1, k], **line_style(BOUND), label="threshold"
-            )
+            axes.axhline(known[0][k], **line_style(BOUND), label="threshold")
         axes.set_title(cable.name, fontsize=10)
-        axes.grid(alpha=0.3)
         axes.label_outer()
-    for axes in grid.flat[len(cables) :]:
-        axes.remove()
-    drawn.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    legend_below(drawn, panels[:1])
     return drawn
 
 
 def small_multiples(
-    title: str,
-    draw: Draw,
-    size: tuple[float, float],
-    rows: Frame,
-    of: Sequence[str],
+    title: str, draw: Draw, size: tuple[float, float], of: Sequence[str], rows: Frame,
     labels: Mapping[str, str],
-) -> Figure:
+) -> Figure:  # fmt: skip
     """One small picture for each configuration."""
     shown = shown_of(rows, of, labels)
-    columns = min(len(shown), 4)
-    lines = -(-len(shown) // columns)
-    drawn = bare_figure((max(size[0] * columns, 8.0), size[1] * lines + 1.4), title)
-    grid = drawn.subplots(lines, columns, squeeze=False)
-    for axes, one in zip(grid.flat, shown, strict=False):
+    drawn, panels = tiles(len(shown), min(len(shown), 4), size, title)
+    for axes, one in zip(panels, shown, strict=True):
         draw(axes, [one])
         axes.set_title(one.label, fontsize=10)
-        axes.grid(alpha=0.3)
-    for axes in grid.flat[len(shown) :]:
-        axes.remove()
-    legend_below(drawn, list(grid.flat)[: len(shown)])
+    legend_below(drawn, panels)
     return drawn
 
 
@@ -490,10 +479,7 @@ def draw_rank(axes: Any, shown: Sequence[Shown]) -> None:
 
 
 def group_figures(
-    about: str,
-    groups: Mapping[str, Mapping[str, str]],
-    stability: bool,
-    laps: Mapping[str, float],
+    about: str, groups: Mapping[str, Mapping[str, str]], stability: bool, laps: Mapping[str, float]
 ) -> dict[str, Callable[..., Figure]]:
     """Figures of every experiment, by the name of the file.
 
@@ -502,78 +488,58 @@ def group_figures(
     """
     found: dict[str, Callable[..., Figure]] = {}
     for group, names in groups.items():
-        of, title = tuple(names), f"{about}\n{group}" if group else about
-        lap = laps.get(group)
-        over_laps = title if lap is None else f"{title}, the first {2.0 * lap:g} s"
+        of, lap = tuple(names), laps.get(group)
+        title = f"{about}\n{group}" if group else about
+        early = title if lap is None else f"{title}, the first {2.0 * lap:g} s"
         in_laps = "" if lap is None else f", largest error in each lap of {lap:g} s"
-        end = f"_{group.lower().replace(' ', '_')}" if group else ""
-
-        def lines(words: str, *panels: Panel, title: str = title) -> Callable[..., Figure]:
-            return layout(
-                f"{words}\n{title}", [panels[k : k + 2] for k in range(0, len(panels), 2)]
-            )
+        means = f"Mean and range over the runs with projected images\n{title}"
 
         def bar(name: str, words: str, factor: float = 1.0, of: tuple[str, ...] = of) -> Panel:
             return Panel(bars(words, {words: column(name, factor)}), of, words.partition(" [")[0])
 
-        found |= {
-            f"image_paths{end}": lines(
-                "Path of the object's centre in the image",
-                Panel(IMAGE, of, "path"),
-                Panel(IMAGE_AWAY, of, "distance"),
-                title=over_laps,
+        drawn: dict[str, Callable[..., Figure]] = {
+            "image_paths": layout(f"Path of the object's centre in the image\n{early}", [
+                [Panel(IMAGE, of, "path"), Panel(IMAGE_AWAY, of, "distance")],
+            ]),
+            "camera_paths": layout(f"Path of the camera, Co, in the world frame W\n{early}", [
+                [Panel(CAMERA, of, "path", space=True), Panel(CAMERA_AWAY, of, "distance")],
+            ]),
+            "pose_estimates": layout(
+                f"Estimated pose of the platform against the true one{in_laps}\n{title}",
+                [[Panel(PLACE_ERROR, of, "place"), Panel(TURN_ERROR, of, "rotation")]],
             ),
-            f"camera_paths{end}": lines(
-                "Path of the camera, Co, in the world frame W",
-                Panel(CAMERA, of, "path", space=True),
-                Panel(CAMERA_AWAY, of, "distance"),
-                title=over_laps,
-            ),
-            f"pose_estimates{end}": lines(
-                f"Estimated pose of the platform against the true one{in_laps}",
-                Panel(PLACE_ERROR, of, "place"),
-                Panel(TURN_ERROR, of, "rotation"),
-            ),
-            f"deviations{end}": lines(
-                "Mean and range over the runs with projected images",
-                bar("image_max_px", "image, largest [px]"),
-                bar("image_mean_px", "image, mean [px]"),
-                bar("camera_max_m", "camera, largest [mm]", 1e3),
-                bar("camera_mean_m", "camera, mean [mm]", 1e3),
-            ),
-            f"estimates{end}": lines(
-                "Mean and range over the runs with projected images",
-                bar("estimate_max_m", "pose estimate, largest error [mm]", 1e3),
-                bar("estimate_max_rad", "pose estimate, largest error [deg]", DEG),
-            ),
-        }
+            "deviations": layout(means, [
+                [bar("image_max_px", "image, largest [px]"),
+                 bar("image_mean_px", "image, mean [px]")],
+                [bar("camera_max_m", "camera, largest [mm]", 1e3),
+                 bar("camera_mean_m", "camera, mean [mm]", 1e3)],
+            ]),
+            "estimates": layout(means, [
+                [bar("estimate_max_m", "pose estimate, largest error [mm]", 1e3),
+                 bar("estimate_max_rad", "pose estimate, largest error [deg]", DEG)],
+            ]),
+        }  # fmt: skip
         multiples = {
-            "errors": ("Feature error", components("error"), (4.6, 3.0)),
-            "cable_velocities": ("Cable velocity", components("cable_velocities", 1e3), (4.6, 3.0)),
+            "errors": ("Feature error", components("error"), 3.0),
+            "cable_velocities": ("Cable velocity", components("cable_velocities", 1e3), 3.0),
         }
         if stability:
-            multiples["stability"] = (
-                "Cables that pull; hatched: too few to hold the platform",
-                draw_rank,
-                (4.2, 2.4),
-            )
-            for quantity in ("cable_lengths", "cable_tensions"):
-                words = f"{quantity.replace('_', ' ').capitalize()}, cable by cable\n{title}"
-                found[f"{quantity}{end}"] = partial(cable_layout, words, quantity, of)
-        for name, (words, draw, size) in multiples.items():
-            found[f"{name}{end}"] = (
-                lambda rows, labels, words=words, draw=draw, size=size, of=of, title=over_laps: (
-                    small_multiples(f"{words}\n{title}", draw, size, rows, of, labels)
-                )
-            )
+            words = "Cables that pull; hatched: too few to hold the platform"
+            multiples["stability"] = words, draw_rank, 2.4
+            for name in ("cable_lengths", "cable_tensions"):
+                words = f"{name.replace('_', ' ').capitalize()}, cable by cable\n{title}"
+                drawn[name] = partial(cable_layout, words, name, of)
+        for name, (words, draw, height) in multiples.items():
+            drawn[name] = partial(small_multiples, f"{words}\n{early}", draw, (4.6, height), of)
         if lap is not None:
-            del found[f"deviations{end}"]  # behind an object that moves there is no straight line
-            changes = dict.fromkeys(
-                ("image_paths", "camera_paths", "errors", "cable_velocities"),
-                partial(beginning, seconds=2.0 * lap),
-            ) | {"pose_estimates": partial(largest_by_lap, lap=lap)}
-            for name, change in changes.items():
-                found[f"{name}{end}"] = of_first_runs(found[f"{name}{end}"], change)
+            del drawn["deviations"]  # behind an object that moves there is no straight line
+            for name in ("image_paths", "camera_paths", "errors", "cable_velocities"):
+                drawn[name] = of_first_runs(drawn[name], partial(beginning, seconds=2.0 * lap))
+            drawn["pose_estimates"] = of_first_runs(
+                drawn["pose_estimates"], partial(largest_by_lap, lap=lap)
+            )
+        end = f"_{group.lower().replace(' ', '_')}" if group else ""
+        found |= {f"{name}{end}": draw for name, draw in drawn.items()}
     return found
 
 
@@ -634,7 +600,3 @@ def legend_below(drawn: Any, panels: Sequence[Any]) -> None:
         if columns == 1 or legend.get_window_extent().width <= drawn.bbox.width:
             return
         legend.remove()
-
-
-def _once(number: int, label: str) -> str | None:
-    return label if number == 0 else None

@@ -14,13 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cache, partial
+from functools import partial
 from itertools import product
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.studies.recipe_variants import shipped_robot
 from cdpr_drake.analyses.studies.rows import Call
 from cdpr_drake.analyses.studies.stability_ranges_figures import (
     ANSWERS,
@@ -46,8 +47,6 @@ from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles, pose_rows
-from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.stability.criterion_closed_forms import (
     PlanarVisionLimits,
     planar_margin,
@@ -239,7 +238,7 @@ class LimitedRobot:
     @property
     def planar(self) -> bool:
         """True if it moves in a plane."""
-        return _robot(self.name).motion_type().is_horizontal_body
+        return shipped_robot(self.name).motion_type().is_horizontal_body
 
     def samples(self, limits: RobotLimits) -> tuple[Array, Array]:
         """Poses, shape (N, 7), and an error e_t for each, shape (N, 3) [m]: where limits are tried.
@@ -257,31 +256,26 @@ class LimitedRobot:
             for x, y, z in product(places, places, sorted({limits.low, limits.high}))
             for turn in product(*tilts, _angles(limits.psi, wide * TURN_STEP))
         ])  # fmt: skip
-        errors = limits.error * self._directions() if limits.error > 0.0 else np.zeros((1, 3))
-        return np.repeat(poses, len(errors), axis=0), np.tile(errors, (len(poses), 1))
-
-    def _directions(self) -> Array:
         if self.coarse:
-            return np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-        if self.planar:
+            directions = np.eye(3)[1:2]
+        elif self.planar:
             around = np.arange(8) * np.pi / 4.0
-            ring = np.stack([np.cos(around), np.sin(around), np.zeros(8)], axis=1)
-            return np.concatenate([np.zeros((1, 3)), ring])
-        return np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+            directions = np.stack([np.cos(around), np.sin(around), np.zeros(8)], axis=1)
+        else:
+            directions = np.concatenate([np.eye(3), -np.eye(3)])
+        errors = np.zeros((1, 3))
+        if limits.error > 0.0:
+            errors = np.concatenate([errors, limits.error * directions])
+        return np.repeat(poses, len(errors), axis=0), np.tile(errors, (len(poses), 1))
 
     def case(self, errors: Array) -> StabilityCase:
         """The case of poses with these errors, shape (N, 3) [m]."""
         x, y, turn = self.camera
         X_PC = RigidTransform(RotationMatrix.MakeZRotation(math.radians(turn)), [x, y, 0.0])
-        cables = _robot(self.name).cable_set().without_pulleys()
+        cables = shipped_robot(self.name).cable_set().without_pulleys()
         return StabilityCase(
             cables, planar=self.planar, X_PC=X_PC, target=PoseErrors(errors), lever=PRINTED
         )
-
-
-@cache
-def _robot(name: str) -> Robot:
-    return load_robot(name)
 
 
 def _angles(limit: float, step: float) -> Array:
@@ -402,10 +396,10 @@ def vision_cases(quick: bool) -> Iterator[Case]:
     for error in TURN_ERRORS[::step]:
         call = partial(object_turn_row, error)
         yield range_case(SPATIAL_VISION, "turn", "theta_u", {"d_theta_s": error}, call)
-    for series in OBJECT_SERIES:
-        values = series.values[::2] if quick else series.values
+    for group, base, varied, values, *rest in OBJECT_SERIES:
+        some = values[:: 2 if quick else 1]
         yield from series_cases(
-            SPATIAL_CAMERA, LimitedRobot(SPATIAL), replace(series, values=values)
+            SPATIAL_CAMERA, LimitedRobot(SPATIAL), group, base, varied, some, *rest
         )
 
 
@@ -429,11 +423,9 @@ def object_place_row(turn: float, error: float) -> dict[str, float]:
 def object_turn_row(error: float) -> dict[str, float]:
     """Spatial analysis I: the largest theta under an error of it [deg], the object's position
     exact."""
-
-    def stable(turn: float) -> bool:
-        return worst_object_error(math.radians(turn), math.radians(error)) > 0.0
-
-    return {"found_deg": bisected(stable, 180.0, 1.0)}
+    wrong = math.radians(error)
+    found = bisected(lambda turn: worst_object_error(math.radians(turn), wrong) > 0.0, 180.0, 1.0)
+    return {"found_deg": found}
 
 
 # Analysis III, where the robot's model is wrong, too.
@@ -443,45 +435,21 @@ PLANAR_FINE = RobotLimits(
     place=0.2, psi=10.0, error=0.5, r_bp=0.01, d_theta_bp=3.0, r_s=0.05, r_pc=0.01,
     d_theta_pc=3.0, r_B=0.004,
 )  # fmt: skip
-PLANAR_COARSE = RobotLimits(
-    place=0.2, psi=10.0, error=1.0, r_bp=0.05, d_theta_bp=5.0, r_s=0.2, r_pc=0.01,
-    d_theta_pc=10.0, r_B=0.008,
-)  # fmt: skip
+PLANAR_COARSE = replace(
+    PLANAR_FINE, error=1.0, r_bp=0.05, d_theta_bp=5.0, r_s=0.2, d_theta_pc=10.0, r_B=0.008
+)
 SPATIAL_FINE = RobotLimits(
     place=0.1, error=0.5, r_bp=0.03, d_theta_bp=3.0, r_s=0.05, r_pc=0.01, d_theta_pc=3.0,
     r_B=0.008, low=0.3, high=0.3,
 )  # fmt: skip
-SPATIAL_COARSE = RobotLimits(
-    place=0.1, error=1.0, r_bp=0.06, d_theta_bp=5.0, r_s=0.3, r_pc=0.01, d_theta_pc=10.0,
-    r_B=0.008, low=0.3, high=0.3,
-)  # fmt: skip
+SPATIAL_COARSE = replace(
+    SPATIAL_FINE, error=1.0, r_bp=0.06, d_theta_bp=5.0, r_s=0.3, d_theta_pc=10.0
+)
 """Limits of the combinations of a series, but for those that vary: errors known well, and coarsely;
 r_B of the spatial robot as printed in 3.2.2."""
 
 OBJECT = RobotLimits(low=0.3, high=0.3, error=0.5, r_s=0.1, r_pc=0.02, d_theta_pc=10.0)
 """The same in the spatial analysis II."""
-
-
-@dataclass(frozen=True)
-class Series:
-    """Combinations that differ in one limit.
-
-    Attributes:
-        group: Name.
-        base: Limits that are the same.
-        varied: Limits that vary, all with the same value.
-        values: Values [m, deg].
-        sought: What is sought in each.
-        proof: Resolution of what is certified: the same steps, or eighths of what is searched;
-            empty: nothing is certified.
-    """
-
-    group: str
-    base: RobotLimits
-    varied: tuple[str, ...]
-    values: tuple[float, ...]
-    sought: Sought
-    proof: Literal["", "steps", "eighths"] = ""
 
 
 TURN, WIDE_TURN = Sought(("psi",), 90.0, 1.0), Sought(("psi",), 150.0, 2.0)
@@ -492,39 +460,37 @@ PLACES, CAMERA_ERRORS = (0.0, 0.1, 0.2, 0.3, 0.4), (0.0, 0.01, 0.03, 0.05)
 POINT_ERRORS, HEIGHTS = (0.0, 0.05, 0.1, 0.2), (0.0, 0.3, 0.6, 0.8, 1.0)
 """Values of limits that series vary [m]."""
 
-OBJECT_SERIES = (
-    Series("error", OBJECT, ("error",), (0.1, 0.5, 1.0, 1.5, 2.0, 3.0),
-           Sought(("r_s",), 3.0, 0.02), "steps"),
-    Series("r_s", OBJECT, ("r_s",), (0.0, 0.25, 0.5, 1.0, 1.5), CAMERA_TURN, "steps"),
-    Series("r_pc", OBJECT, ("r_pc",), (0.0, 0.05, 0.1, 0.2, 0.5), CAMERA_TURN, "steps"),
+OBJECT_SERIES: Sequence[Any] = (
+    ("error", OBJECT, ("error",), (0.1, 0.5, 1.0, 1.5, 2.0, 3.0),
+     Sought(("r_s",), 3.0, 0.02), "steps"),
+    ("r_s", OBJECT, ("r_s",), (0.0, 0.25, 0.5, 1.0, 1.5), CAMERA_TURN, "steps"),
+    ("r_pc", OBJECT, ("r_pc",), (0.0, 0.05, 0.1, 0.2, 0.5), CAMERA_TURN, "steps"),
 )  # fmt: skip
 """Of the spatial analysis II; theta u is zero."""
 
-PLANAR_SERIES = (
-    Series("place", PLANAR_FINE, ("place",), (*PLACES, 0.45), Sought(("r_bp",), 0.4, 0.005),
-           "eighths"),
-    Series("error", PLANAR_FINE, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0),
-           Sought(("r_s",), 2.0, 0.02)),
-    Series("r_pc", PLANAR_FINE, ("r_pc",), CAMERA_ERRORS, TURN),
-    Series("r_pc coarse", PLANAR_COARSE, ("r_pc",), CAMERA_ERRORS, TURN),
-    Series("r_B", PLANAR_FINE, ("r_B",), (0.0, 0.004, 0.008, 0.016, 0.03),
-           Sought(("d_theta_bp",), 90.0, 1.0), "eighths"),
-    Series("psi", PLANAR_FINE, ("place",), (*PLACES, 0.45), TURN),
+PLANAR_SERIES: Sequence[Any] = (
+    ("place", PLANAR_FINE, ("place",), (*PLACES, 0.45), Sought(("r_bp",), 0.4, 0.005), "eighths"),
+    ("error", PLANAR_FINE, ("error",), (0.05, 0.1, 0.5, 1.0, 2.0), Sought(("r_s",), 2.0, 0.02)),
+    ("r_pc", PLANAR_FINE, ("r_pc",), CAMERA_ERRORS, TURN),
+    ("r_pc coarse", PLANAR_COARSE, ("r_pc",), CAMERA_ERRORS, TURN),
+    ("r_B", PLANAR_FINE, ("r_B",), (0.0, 0.004, 0.008, 0.016, 0.03),
+     Sought(("d_theta_bp",), 90.0, 1.0), "eighths"),
+    ("psi", PLANAR_FINE, ("place",), (*PLACES, 0.45), TURN),
 )  # fmt: skip
 CENTRED = replace(SPATIAL_FINE, place=0.0)
-SPATIAL_SERIES = (
+SPATIAL_SERIES: Sequence[Any] = (
     *(
-        Series(f"{name} {motion}{words}", base, (name,), POINT_ERRORS, sought)
+        (f"{name} {motion}{words}", base, (name,), POINT_ERRORS, sought)
         for words, base in (("", SPATIAL_COARSE), (" well", SPATIAL_FINE))
         for name in ("r_bp", "r_pc")
         for motion, sought in (("psi", WIDE_TURN), ("tilt", TILT))
     ),
-    Series("psi tilt", SPATIAL_FINE, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), TILT),
-    Series("place r_bp", SPATIAL_FINE, ("place",), PLACES, PLACE, "eighths"),
-    Series("height r_bp", CENTRED, ("low", "high"), HEIGHTS, PLACE),
-    Series("place psi", SPATIAL_COARSE, ("place",), PLACES, WIDE_TURN),
-    Series("place tilt", SPATIAL_FINE, ("place",), PLACES, TILT),
-    Series("height tilt", CENTRED, ("low", "high"), HEIGHTS, TILT),
+    ("psi tilt", SPATIAL_FINE, ("psi",), (0.0, 15.0, 30.0, 45.0, 60.0), TILT),
+    ("place r_bp", SPATIAL_FINE, ("place",), PLACES, PLACE, "eighths"),
+    ("height r_bp", CENTRED, ("low", "high"), HEIGHTS, PLACE),
+    ("place psi", SPATIAL_COARSE, ("place",), PLACES, WIDE_TURN),
+    ("place tilt", SPATIAL_FINE, ("place",), PLACES, TILT),
+    ("height tilt", CENTRED, ("low", "high"), HEIGHTS, TILT),
 )
 """Of analysis III. Places and angles are limits, each with everything within; heights are single
 ones."""
@@ -534,43 +500,55 @@ def robot_cases(quick: bool) -> Iterator[Case]:
     """Analysis III; `quick`: the first and last combination of each series, coarsely."""
     planar = LimitedRobot(PLANAR, steps=1 if quick else 2, mirrored=True, coarse=quick)
     for series in PLANAR_SERIES:
-        yield from series_cases(PLANAR_ROBOT, planar, coarsened(series) if quick else series)
+        yield from series_cases(PLANAR_ROBOT, planar, *series, ends=quick)
     limits, sought = replace(PLANAR_FINE, place=0.3), Sought(("r_bp",), 0.4, CAMERA_STEP)
     for camera, place in CAMERAS.items():
-        x, y, turn = place
-        columns = {"camera_x": x, "camera_y": y, "camera_turn": turn, **limits.without("r_bp")}
-        robot = LimitedRobot(PLANAR, place, coarse=quick)
-        call = partial(limit_row, robot, limits, sought)
+        at = dict(zip(("camera_x", "camera_y", "camera_turn"), place, strict=True))
+        columns = {**at, **limits.without("r_bp")}
+        call = partial(limit_row, LimitedRobot(PLANAR, place, coarse=quick), limits, sought)
         yield range_case(PLANAR_ROBOT, "camera", "r_bp", columns, call, camera=camera)
     for r_bp in AREAS:
         limits = replace(PLANAR_FINE, r_bp=r_bp)
-        call = partial(area_row, limits, quick)
-        yield range_case(PLANAR_ROBOT, "area", "workspace", limits.without("place", "psi"), call)
+        columns, call = limits.without("place", "psi"), partial(area_row, limits, quick)
+        yield range_case(PLANAR_ROBOT, "area", "workspace", columns, call)
     robot = LimitedRobot(SPATIAL, coarse=quick)
     for series in SPATIAL_SERIES:
-        yield from series_cases(SPATIAL_ROBOT, robot, coarsened(series) if quick else series)
+        yield from series_cases(SPATIAL_ROBOT, robot, *series, ends=quick)
 
 
-def series_cases(section: str, robot: LimitedRobot, series: Series) -> Iterator[Case]:
-    """All combinations of a series."""
-    names = series.sought.names
-    for value in series.values:
-        limits = series.base.varied(series.varied, value)
-        call = partial(limit_row, robot, limits, series.sought, series.proof)
-        yield range_case(section, series.group, ", ".join(names), limits.without(*names), call)
+def series_cases(
+    section: str, robot: LimitedRobot, group: str, base: RobotLimits, varied: Sequence[str],
+    values: Sequence[float], sought: Sought, proof: str = "", *, ends: bool = False,
+) -> Iterator[Case]:  # fmt: skip
+    """Combinations that differ in one limit.
 
-
-def coarsened(series: Series) -> Series:
-    """The first and last combination of a series, at a fifth of its resolution."""
-    sought = replace(series.sought, step=5.0 * series.sought.step)
-    return replace(series, values=(series.values[0], series.values[-1]), sought=sought, proof="")
+    Args:
+        section: Of the thesis.
+        robot: The robot.
+        group: Name of the series.
+        base: Limits that are the same.
+        varied: Limits that vary, all with the same value.
+        values: Values [m, deg].
+        sought: What is sought in each.
+        proof: Resolution of what is certified: the same "steps", or "eighths" of what is searched;
+            empty: nothing is certified.
+        ends: True to take the first and last alone, at a fifth of the resolution, uncertified.
+    """
+    if ends:
+        values, proof = (values[0], values[-1]), ""
+        sought = replace(sought, step=5.0 * sought.step)
+    for value in values:
+        limits = base.varied(varied, value)
+        call = partial(limit_row, robot, limits, sought, proof)
+        columns = limits.without(*sought.names)
+        yield range_case(section, group, ", ".join(sought.names), columns, call)
 
 
 def limit_row(
     robot: LimitedRobot, limits: RobotLimits, sought: Sought, proof: str = ""
 ) -> dict[str, float]:
     """The largest of the sought limits: searched_m or searched_deg, by a search for the worst;
-    certified_m or certified_deg, see `Series.proof`."""
+    certified_m or certified_deg, see `series_cases`."""
     unit = unit_of_limit(sought.names[0])
     searched = largest_limit(robot, limits, sought)
     row = {f"searched_{unit}": searched}
@@ -671,23 +649,18 @@ def object_table(rows: Frame) -> Frame:
     return table.rename_axis(columns=None).reset_index()
 
 
-def parameters(form: Form) -> Mapping[str, Any]:
-    """What all combinations have in common."""
-    return {
-        "single errors": {"draws": DRAWS, "seed": 0, "robot": SPATIAL},
-        "combinations": {
-            "options": asdict(OPTIONS), "turn_step_deg": TURN_STEP, "tilt_step_deg": TILT_STEP,
-            "robots": list(ROBOTS),
-        },
-    }  # fmt: skip
-
-
 STUDY = Study(
     name="stability-ranges",
     title="How large errors may be before a servo's stability is lost",
     source="servoing thesis 3.2.1, 3.2.2, 3.3.2 and 3.4.2",
     cases=cases,
-    parameters=parameters,
+    parameters=lambda form: {
+        "single errors": {"draws": DRAWS, "seed": 0, "robot": SPATIAL},
+        "combinations": {
+            "options": asdict(OPTIONS), "turn_step_deg": TURN_STEP, "tilt_step_deg": TILT_STEP,
+            "robots": list(ROBOTS),
+        },
+    },
     assumptions=ASSUMPTIONS,
     coarse=True,
     tables={

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.studies.study import Frame, select
@@ -76,14 +75,11 @@ def largest(row: Row) -> float:
 
 def limit_words(row: Row) -> str:
     """Limits of a row in words; those that are zero are left out."""
-    limits = {
-        name: value for name, value in row.items()
+    limits = (
+        (*name.rpartition("_"), value) for name, value in row.items()
         if name.endswith(("_m", "_deg")) and not name.startswith(ANSWERS) and value > 0.0
-    }  # fmt: skip
-    return ", ".join(
-        f"{column.rpartition('_')[0]} {value:g} {column.rpartition('_')[2]}"
-        for column, value in limits.items()
-    )
+    )  # fmt: skip
+    return ", ".join(f"{name} {value:g} {unit}" for name, _, unit, value in limits)
 
 
 def combination_figure(
@@ -92,18 +88,20 @@ def combination_figure(
     """Every combination as a column: its limits, and the largest that is stable, filled."""
     columns = select(rows, section=section)
     columns = columns[~columns["group"].isin(left_out)]
-    combinations = columns.to_dict("records")
+    combinations, groups = columns.to_dict("records"), columns["group"]
     figure, (top, bottom) = new_figure(
         2, 1, (width, 8.0), f"{title}. One combination in each column; filled: the largest found"
     )
-    x = _places(columns["group"])
+    counted = np.arange(1, len(columns) + 1)
+    x = counted + (groups != groups.shift()).cumsum().to_numpy() - 1.0  # a gap between groups
     sought = np.array([largest(row) for row in combinations])
-    for axes, limits, unit in ((top, LENGTHS, "m"), (bottom, ANGLES, "deg")):
-        least = LEAST_DRAWN_LENGTH if axes is top else 0.0
+    for axes, limits, unit, least, begin in (
+        (top, LENGTHS, "m", LEAST_DRAWN_LENGTH, 0), (bottom, ANGLES, "deg", 0.0, len(LENGTHS)),
+    ):  # fmt: skip
         for place in x:
             axes.axvline(place, color="0.88", lw=1.0, zorder=0)
-        for number, (name, (label, marker)) in enumerate(limits.items()):
-            colour = nth_look(number + (len(LENGTHS) if axes is bottom else 0)).color
+        for number, (name, (label, marker)) in enumerate(limits.items(), start=begin):
+            colour = nth_look(number).color
             limit = np.array([row.get(f"{name}_{unit}", np.nan) for row in combinations], float)
             filled = np.array([name in row["sought"].split(", ") for row in combinations])
             for shown, y, face, size in (
@@ -114,7 +112,7 @@ def combination_figure(
                         x[shown], np.maximum(y[shown], least), marker, ls="none", mfc=face,
                         mec=colour, ms=size, label=label,
                     )  # fmt: skip
-        axes.set_xticks(x, [str(n + 1) for n in range(len(x))], fontsize=8)
+        axes.set_xticks(x, counted, fontsize=8)
         axes.grid(visible=False, axis="x")
         axes.set_xlim(x[0] - 0.8, x[-1] + 0.8)
     printed = columns["printed_deg"].to_numpy(float)
@@ -123,35 +121,21 @@ def combination_figure(
             x, printed, "_", ls="none", color=PUBLISHED.color, ms=16, mew=2, label="published"
         )
     for axes in (top, bottom):
-        axes.legend(*_once(axes), loc="center left", bbox_to_anchor=(1.0, 0.5))
-    _name_groups(top, columns["group"], x)
-    top.set(yscale="log", ylabel="lengths [m]")
-    bottom.set(ylabel="angles [deg]", xlabel="combination")
-    return figure
-
-
-def _places(groups: Any) -> np.ndarray:
-    """Places of the columns, with a gap between groups."""
-    return np.arange(1.0, len(groups) + 1.0) + (groups != groups.shift()).cumsum().to_numpy() - 1.0
-
-
-def _name_groups(axes: Axes, groups: Any, x: np.ndarray) -> None:
+        handles, labels = axes.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        axes.legend(once.values(), once, loc="center left", bbox_to_anchor=(1.0, 0.5))
     names = groups.unique()
     for group in names if len(names) > 1 else ():
         first, *_, last = group.split() * 2
         words = VARIED.get(group) or VARIED[first]
         words += {"coarse": ",\nrest coarse", "well": ",\nrest well"}.get(last, "")
-        axes.text(
+        top.text(
             float(np.mean(x[groups == group])), 1.02, words, fontsize=8, ha="center",
-            transform=axes.get_xaxis_transform(),
+            transform=top.get_xaxis_transform(),
         )  # fmt: skip
-
-
-def _once(axes: Axes) -> tuple[list[Any], list[str]]:
-    """Handles and labels of a legend, a label once."""
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    return list(once.values()), list(once)
+    top.set(yscale="log", ylabel="lengths [m]")
+    bottom.set(ylabel="angles [deg]", xlabel="combination")
+    return figure
 
 
 def object_figure(rows: Frame) -> Figure:
@@ -209,20 +193,16 @@ def single_figure(rows: Frame) -> Figure:
     }
     parameters = select(rows, section=SINGLE).to_dict("records")
     figure, axes = new_figure(1, 1, (9.5, 9.0), "ACROBOT, small platform: one wrong parameter")
+    drawn: dict[str, Any] = {}
     for place, row in enumerate(parameters):
         bars = [name for name in looks if not np.isnan(row.get(name, np.nan))]
         size = 0.85 / len(bars)
         for number, name in enumerate(bars):
             y = place + size * (number - (len(bars) - 1) / 2.0)
-            words, look = looks[name]
-            drawn = max(row[name], LEAST_DRAWN_VOLUME)
-            axes.barh(y, drawn, 0.9 * size, label=words, **bar_style(look))
+            volume = max(row[name], LEAST_DRAWN_VOLUME)
+            drawn[name] = axes.barh(y, volume, 0.9 * size, **bar_style(looks[name][1]))
     axes.set_yticks(range(len(parameters)), [limit_words(row) for row in parameters])
     axes.set(ylim=(len(parameters) - 0.5, -0.5), xlabel="workspace [m³]")
-    handles, labels = _once(axes)
-    order = [words for words, _ in looks.values() if words in labels]
-    figure.legend(
-        [handles[labels.index(words)] for words in order], order, loc="outside lower center",
-        ncols=3,
-    )  # fmt: skip
+    legend = {looks[name][0]: drawn[name] for name in looks if name in drawn}
+    figure.legend(legend.values(), legend, loc="outside lower center", ncols=3)
     return figure

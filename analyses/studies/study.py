@@ -54,7 +54,7 @@ MOST_SEEDS = 10_000
 UNITS = {
     "m": "m", "m2": "m^2", "m3": "m^3", "rad": "rad", "deg": "deg", "px": "px", "s": "s", "n": "N",
     "n_m": "N m", "n2": "N^2", "m_s": "m/s", "rad_s": "rad/s", "m_s2": "m/s^2", "kg": "kg",
-    "hz": "Hz", "us": "us", "percent": "%",
+    "hz": "Hz", "us": "us", "percent": "%", "j": "J", "w": "W",
 }  # fmt: skip
 """Units by the last words of the names of columns."""
 

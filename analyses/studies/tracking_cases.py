@@ -12,9 +12,8 @@ from cdpr_drake.analyses.studies.experiments import SETS, SETUP, TIME, TRACKING
 from cdpr_drake.analyses.studies.servo import PULLEYS, Configuration, servo_study
 from cdpr_drake.analyses.studies.servo_figures import (
     Panel,
-    bars,
-    column,
     components,
+    largest_and_mean,
     layout,
     paths_layout,
 )
@@ -50,12 +49,6 @@ def without_pulleys() -> tuple[Configuration, ...]:
 def names_of(*sets: str, prefix: str = "") -> tuple[str, ...]:
     """Names of configurations without and with tracking, set by set."""
     return tuple(f"{prefix}{name}_{kind}" for name in sets for kind in ("servo", "tracking"))
-
-
-def distances(label: str, columns: Mapping[str, str], factor: float, words: str) -> Panel:
-    """Largest and mean distances of all sets."""
-    values = {name: column(of, factor) for name, of in columns.items()}
-    return Panel(bars(label, values, letters=True), names_of(*SETS), words)
 
 
 TRACKED, STEP = 28.0, 0.05
@@ -124,16 +117,14 @@ STUDIES = {
                 "over runs",
                 [
                     [
-                        distances(
-                            "distance [px]",
-                            {"largest": "image_max_px", "mean": "image_mean_px"},
-                            1.0,
+                        Panel(
+                            largest_and_mean("distance [px]", "image", "px", letters=True),
+                            names_of(*SETS),
                             "object's centre in the image",
                         ),
-                        distances(
-                            "distance [mm]",
-                            {"largest": "camera_max_m", "mean": "camera_mean_m"},
-                            1e3,
+                        Panel(
+                            largest_and_mean("distance [mm]", "camera", "m", 1e3, letters=True),
+                            names_of(*SETS),
                             "camera in space",
                         ),
                     ]
@@ -162,11 +153,7 @@ STUDIES = {
         ),
         rendered=("tracking",),
         metrics=tracking_numbers,
-        units={
-            "roughness_m_s": "mm/s",
-            "camera_even_mean_m": "mm",
-            "camera_even_spread_m": "mm",
-        },
+        columns=("roughness_m_s", "camera_even_mean_m", "camera_even_spread_m"),
         assumptions=(*RAISED, *COMMON),
         figures={
             "figure_4_7": paths_layout(

@@ -23,20 +23,20 @@ def test_the_hash_changes_with_sources_alone_and_not_with_their_place(tmp_path):
         (folder / "robot.yaml").write_text("name: x")
         (folder / "cli" / "b.py").write_text("b = 1")
     here, there = tmp_path / "here" / "package", tmp_path / "there" / "package"
-    before = hash_of_sources([here], here / "cli")
-    assert before == hash_of_sources([there], there / "cli")
-    assert before == hash_of_sources([here, here / "cli"], here / "cli")
+    before = hash_of_sources([here], [here / "cli"])
+    assert before == hash_of_sources([there], [there / "cli"])
+    assert before == hash_of_sources([here, here / "cli"], [here / "cli"])
     (here / "notes.txt").write_text("no matter")
     (here / "cli" / "b.py").write_text("b = 2")
-    assert hash_of_sources([here], here / "cli") == before
+    assert hash_of_sources([here], [here / "cli"]) == before
     assert hash_of_sources([here]) != hash_of_sources([there])
     for name, words in (("a.py", "a = 2"), ("robot.yaml", "name: y")):
         old = (here / name).read_text()
         (here / name).write_text(words)
-        assert hash_of_sources([here], here / "cli") != before
+        assert hash_of_sources([here], [here / "cli"]) != before
         (here / name).write_text(old)
     (here / "a.py").rename(here / "c.py")
-    assert hash_of_sources([here], here / "cli") != before
+    assert hash_of_sources([here], [here / "cli"]) != before
 
 
 def test_a_full_disk_is_one_line(tmp_path, monkeypatch):

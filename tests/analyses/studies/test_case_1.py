@@ -12,9 +12,9 @@ from cdpr_drake.analyses.studies.case_1 import (
     POINTS,
     STUDY,
     TABLE_2_1,
+    accuracy_figure,
     final_accuracy,
 )
-from cdpr_drake.analyses.studies.case_1_figures import accuracy_figure
 from cdpr_drake.analyses.studies.facts import MissingRuns, facts_of
 from cdpr_drake.analyses.studies.servo_figures import beginning, largest_by_lap
 from cdpr_drake.systems.diagrams.load import load_scenario

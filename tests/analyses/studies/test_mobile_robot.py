@@ -7,7 +7,9 @@ import pytest
 from cdpr_drake.analyses.studies.facts import GOOD, facts_of
 from cdpr_drake.analyses.studies.mobile_robot import (
     CORNERS,
+    PHASES,
     STUDY,
+    TENSION_LAPS,
     VARIED,
     VIEWS,
     at_one_place,
@@ -18,7 +20,6 @@ from cdpr_drake.analyses.studies.mobile_robot import (
     view_margin,
     with_friction,
 )
-from cdpr_drake.analyses.studies.mobile_robot_figures import PHASES, TENSION_LAPS
 from cdpr_drake.analyses.studies.study import Form
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
