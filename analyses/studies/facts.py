@@ -20,7 +20,8 @@ import numpy as np
 import pandas as pd
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from cdpr_drake.schema.yaml_files import load_yaml
+from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 
 Frame: TypeAlias = pd.DataFrame
 
@@ -49,6 +50,9 @@ UNIT_WORDS = {
 }  # fmt: skip
 """Units by the last word of a column's name."""
 
+UNITS_OF_PRINTS = (*FACTORS, *dict.fromkeys(UNIT_WORDS.values()), "N^2", "m^2", "m^3", "1/m")
+"""What `unit` may be; those without a factor are the columns' own."""
+
 OVER: Mapping[str, Callable[[Any], Any]] = {
     "mean": np.mean, "median": np.median, "max": np.max, "min": np.min, "sum": np.sum,
     "rms": lambda values: np.sqrt(np.mean(np.square(values))),
@@ -66,14 +70,18 @@ COMPARISONS = (
 )  # fmt: skip
 
 BOUND_WORDS = {
-    r"at most|not surpass|not exceed|below|less than|under \d|up to|no more than": (
-        "at_most", "below",
-    ),
+    r"at most|not (?:surpass|exceed|above)|below|less than|under \d|up to"
+    r"|\bno\b(?: \w+){0,4} (?:more than|exceeds|above)": ("at_most", "below"),
     r"at least|more than|exceeds|above": ("at_least", "above"),
 }  # fmt: skip
-"""Words that print a bound, and the comparisons of which a fact then has one."""
+"""Words that print a bound, and the comparisons of which a fact then has one; what the first found
+is no longer looked at."""
 
 Bound = float | list[float] | Literal["than"] | None
+
+
+class FactError(CdprError, ValueError):
+    """A fact is not accepted; the words name file, section, fact and field."""
 
 
 class MissingRuns(Exception):
@@ -200,6 +208,8 @@ class Part(Selection):
     @model_validator(mode="after")
     def _one_comparison(self) -> Part:
         names = [name for name in COMPARISONS if getattr(self, name) not in (None, "")]
+        if self.unit and self.unit not in UNITS_OF_PRINTS:
+            raise ValueError(f"unit: found {self.unit}; accepted: {', '.join(UNITS_OF_PRINTS)}")
         if len(names) != 1:
             found = ", ".join(names) or "no comparison"
             raise ValueError(f"found {found}; accepted: one of {', '.join(COMPARISONS)}")
@@ -384,9 +394,10 @@ class Fact(Entry):
 
     @model_validator(mode="after")
     def _bounds_are_bounds(self) -> Fact:
-        kinds = {part.comparison for part in self.parts}
+        kinds, says = {part.comparison for part in self.parts}, self.says
         for words, accepted in BOUND_WORDS.items():
-            if kinds and re.search(words, self.says) and not kinds & set(accepted):
+            says, bounds = re.subn(words, "", says)
+            if kinds and bounds and not kinds & set(accepted):
                 raise ValueError(
                     f"{self.name}: {self.says!r} prints a bound; found {', '.join(kinds)}; "
                     f"accepted: {' or '.join(accepted)}"
@@ -423,8 +434,8 @@ class Fact(Entry):
             verdict = self._verdict(held, rows)
         except MissingRuns as lacking:
             held, verdict = [], unjudged or "not judged"
-            words = [] if unjudged else [f"runs are missing: {lacking}"]
-        except (KeyError, IndexError, TypeError, ValueError) as problem:  # rows must not be lost
+            words = [f"runs are missing: {lacking}"] if str(lacking) else []
+        except Exception as problem:  # rows must not be lost
             held, verdict, words = [], "not judged", [f"judging failed: {problem}"]
         cause = "; ".join(f"{kind}: {reason}" for kind, reason in self.cause.items()) or "not known"
         return {
@@ -474,32 +485,35 @@ def source_of(words: Mapping[str, Any]) -> Source:
     printed there.
 
     Raises:
-        ValueError: An entry is not accepted.
+        FactError: An entry is not accepted.
     """
     sections: dict[str, list[Fact | Entry]] = {}
     for name, entries in words["sections"].items():
         sections[str(name)] = []
         for entry in entries:
-            kind = Fact if "study" in entry else Entry
-            try:
-                one = kind(**{"at": [str(name).partition(":")[0]], **entry})
-            except ValidationError as problem:
-                first = problem.errors()[0]
-                field = ".".join(map(str, first["loc"]))
-                who = entry.get("name", entry.get("says"))
-                raise ValueError(f"{name}: {who}: {field}: {first['msg']}") from problem
-            sections[str(name)].append(one)
+            at = [str(name).partition(":")[0]]
+            sections[str(name)].append(_entry_of({"at": at, **entry}, str(name)))
     return Source(title=words["title"], sections=sections)
 
 
+def _entry_of(words: Mapping[str, Any], where: str) -> Fact | Entry:
+    try:
+        return (Fact if "study" in words else Entry)(**words)
+    except ValidationError as problem:
+        first = problem.errors()[0]
+        field = ".".join(map(str, first["loc"]))
+        who = words.get("name", words.get("says"))
+        raise FactError(f"{where}: {who}: {field}: {first['msg']}") from problem
+
+
 def check_facts(facts: Iterable[Fact]) -> None:
-    """Refuses facts that stand twice, by name or by what they compare; raises ValueError."""
+    """Refuses facts that stand twice, by name or by what they compare; raises FactError."""
     owners: dict[str, str] = {}
     for fact in facts:
         name = f"{fact.study}/{fact.name}"
         for key in (name, *(f"{fact.study} {part!r}" for part in fact.parts)):
             if key in owners:
-                raise ValueError(f"{name}: the same as {owners[key]}")
+                raise FactError(f"{name}: the same as {owners[key]}")
         owners |= {name: name, **{f"{fact.study} {part!r}": name for part in fact.parts}}
 
 
@@ -508,19 +522,23 @@ def sources() -> tuple[Source, ...]:
     """All sources of this package.
 
     Raises:
-        ValueError: An entry is not accepted, or a fact stands twice.
+        FactError: An entry is not accepted, or a fact stands twice.
     """
-    found = tuple(
-        source_of(load_yaml(path.read_text(encoding="utf-8"))) for path in sorted(FOLDER.glob("*"))
-    )
+    found = []
+    for path in sorted(FOLDER.glob("*.yaml")):
+        try:
+            found.append(source_of(load_yaml(path.read_text(encoding="utf-8"))))
+        except (FactError, YamlTextError) as problem:
+            raise FactError(f"{path.name}: {problem}") from problem
     check_facts(fact for source in found for fact in source.facts())
-    return found
+    return tuple(found)
 
 
 def facts_of(study: str, own: Sequence[Mapping[str, Any]] = ()) -> list[Fact]:
     """Facts that a study answers; its own ones are those of a study outside of this package."""
     if own:
-        return [Fact(**{"study": study, **words}) for words in own]
+        entries = (_entry_of({"study": study, **words}, study) for words in own)
+        return [entry for entry in entries if isinstance(entry, Fact)]
     return [fact for source in sources() for fact in source.facts() if fact.study == study]
 
 

@@ -141,7 +141,7 @@ def reproduce(
             raise CdprError(f"only: study {name!r} is unknown; {closest(name, STUDIES)}")
     older = {} if against is None else _older(Path(against))
     arguments = {"reproduction": names, "quick": quick}
-    failed, left = dict[str, str](), list[str]()
+    failed, left, ran = dict[str, str](), list[str](), list[str]()
     with Folder(Path(folder), arguments, overwrite, grows=True) as results:
         for number, name in enumerate(names):
             if follow.stop():
@@ -161,11 +161,12 @@ def reproduce(
                 failed[name] = f"{kind}{problem}"
                 follow.say(f"{name}: {failed[name]}")
                 continue
+            ran.append(name)
             if found.failed:
                 failed[name] = "; ".join(found.failed.values())
             if found.stopped:
                 left.append(name)
-        report = reproduction_of(results.path, names, quick, failed, left, older)
+        report = reproduction_of(results.path, names, ran, quick, failed, left, older)
         results.write_text(VERDICTS_FILE, _json(_verdicts(report.facts())))
         results.write_text(PAGE, page_of(report))
         if not failed and not left:
@@ -183,11 +184,11 @@ def _named(follow: Follow, words: str) -> Follow:
 
 
 def reproduction_of(
-    folder: Path, names: Sequence[str], quick: bool, failed: Mapping[str, str],
+    folder: Path, names: Sequence[str], ran: Sequence[str], quick: bool, failed: Mapping[str, str],
     left: Sequence[str], older: Mapping[str, str],
 ) -> Reproduction:  # fmt: skip
     """What the studies in a folder say of all sources."""
-    results = {name: _read_json(folder / name / RESULTS) for name in names}
+    results = {name: _read_json(folder / name / RESULTS) if name in ran else None for name in names}
     chapters = []
     for source in sources():
         for section, entries in source.sections.items():

@@ -174,6 +174,9 @@ def run_study(
         raise CdprError(f"recipe: {recipe!r} is unknown for {one.name}; {accepted}")
     if seeds is not None and not 1 <= seeds <= MOST_SEEDS:
         raise CdprError(f"seeds: found {seeds}; accepted: 1 to {MOST_SEEDS}")
+    for fact in facts_of(one.name, one.facts):
+        if fact.find and fact.find not in one.finds:
+            raise CdprError(f"{fact.name}: find: {fact.find!r}; {closest(fact.find, one.finds)}")
     form = Form(quick, seeds, recipe)
     arguments = arguments_of(one.name, form)
     if runs_from is not None:
@@ -299,9 +302,10 @@ class StudyResult(Summarized):
         for title, make in self.study.tables.items():
             try:
                 found[title] = make(self.rows)
-            except (MissingRuns, KeyError):
-                if not (self.interrupted or form.quick or form.recipe):
-                    raise
+            except Exception as problem:  # numbers must not be lost
+                lacks = isinstance(problem, (MissingRuns, KeyError))
+                if not (lacks and (self.interrupted or form.quick or form.recipe)):
+                    self.undrawn[f"table {title!r}"] = f"{type(problem).__name__}: {problem}"
         if self.statements:
             columns = ["words", "printed", "found", "verdict", "rule", "why"]
             found["What has to hold"] = Frame(self.statements, columns=columns)

@@ -128,6 +128,8 @@ REFUSED = {
     "a bound as a size": ({"says": "It is at most 20 mm."}, "prints a bound; found about"),
     "a bound below": ({"says": "It does not surpass 20 mm."}, "accepted: at_most or below"),
     "a bound above": ({"says": "It is more than 20 mm."}, "accepted: at_least or above"),
+    "no more than": ({"says": "No cable needs more than 20 N."}, "accepted: at_most or below"),
+    "an unknown unit": ({"parts": [{**SIZE, "unit": "mN"}]}, "unit: found mN; accepted: mm"),
     "no basis": ({"basis": None}, "basis"),
     "fitted without reason": ({"basis": "fitted"}, "basis fitted; accepted with its reason"),
     "a cause without reason": ({"cause": {"source": "?"}}, "cause; accepted with its reason"),
@@ -234,6 +236,10 @@ def test_every_source_is_accepted_and_its_studies_are_known():
     facts = [fact for source in sources() for fact in source.facts()]
     assert len({source.title for source in sources()}) == 3
     assert facts
+    assert {fact.study for fact in facts} <= set(STUDIES)
+    entries = [entry for source in sources() for some in source.sections.values() for entry in some]
+    for study, figure in (name.split("/") for entry in entries for name in entry.figures):
+        assert figure in study_named(study).figures, f"{study}/{figure}"
     for name in STUDIES:
         study = study_named(name)
         for fact in facts_of(name):
