@@ -71,7 +71,7 @@ COMPARISONS = (
 
 BOUND_WORDS = {
     r"at most|not (?:surpass|exceed|above)|below|less than|under \d|up to"
-    r"|\bno\b(?: \w+){0,4} (?:more than|exceeds|above)": ("at_most", "below"),
+    r"|\b[Nn]o\b(?: \w+){0,4} (?:more than|exceeds|above)": ("at_most", "below"),
     r"at least|more than|exceeds|above": ("at_least", "above"),
 }  # fmt: skip
 """Words that print a bound, and the comparisons of which a fact then has one; what the first found

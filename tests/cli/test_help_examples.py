@@ -46,8 +46,8 @@ LONG_WORK = {
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
     ],
     "scenarios": ["cdpr_drake.cli.scenarios.load_scenario"],
-    "study": [SESSION],
-    "reproduce": [SESSION],
+    "study": ["cdpr_drake.analyses.studies.study.finished_jobs"],
+    "reproduce": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "doctor": ["cdpr_drake.cli.doctor.examine", "cdpr_drake.cli.doctor.run_jobs"],
     "bench": ["cdpr_drake.cli.bench.BENCH_GROUPS"],
 }
