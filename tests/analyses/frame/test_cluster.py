@@ -16,6 +16,7 @@ from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.schema.input_files import input_text, inputs_read_once
 from tests.analyses.frame.test_jobs import read, square
+from tests.messages import printed
 
 distributed = pytest.importorskip("distributed")
 
@@ -53,7 +54,7 @@ def fails(number):
 
 def test_a_job_that_raises_or_kills_its_worker_is_named_and_others_go_on(local, capfd):
     finished = {one.number: one for one in finished_jobs(fails, range(8), local.scheduler_address)}
-    assert capfd.readouterr().err == ""
+    assert printed(capfd).err == ""
     assert sorted(finished) == list(range(8))
     assert finished[2].words().startswith("ValueError: two (on worker tcp://")
     assert isinstance(finished[4].problem, ProcessDied)
