@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from cdpr_drake.analyses.frame.folder import foreign_files, read_marker
 from cdpr_drake.analyses.reporting.log_on_disk import PARTS
 from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
 
@@ -59,7 +60,9 @@ _WHOLE: dict[str, Callable[[Path], bool]] = {
     ".npz": _whole_zip,
     ".png": lambda path: path.read_bytes().endswith(b"IEND\xaeB`\x82"),
     ".pdf": lambda path: path.read_bytes().rstrip().endswith(b"%%EOF"),
-    ".html": lambda path: path.read_text(encoding="utf-8").rstrip().endswith("</html>"),
+    ".html": lambda path: (
+        path.read_text(encoding="utf-8").rstrip().endswith(("</html>", "</table>"))
+    ),
     ".yaml": lambda path: path.read_text(encoding="utf-8").endswith("\n"),
 }
 
@@ -69,7 +72,8 @@ def unknown_files(folder: Path) -> Iterator[str]:
     for marker in folder.rglob(MARKER):
         inside = marker.parent.relative_to(folder)
         if not any(part.startswith(".") for part in inside.parts):
-            for name in others_in(marker.parent):
+            other_files = foreign_files if read_marker(marker.parent) else others_in
+            for name in other_files(marker.parent):
                 yield f"{inside / name} is not known to be the program's"
 
 

@@ -212,7 +212,7 @@ class Folder:
         words = json.dumps(
             {
                 "program": "cdpr_drake", "version": __version__, "complete": complete,
-                "files": self._files, "arguments": self._arguments,
+                "files": sorted(self._files), "arguments": self._arguments,
             },
             indent=1,
         )  # fmt: skip

@@ -62,6 +62,7 @@ class Reproduction(Summarized):
         results: What each study wrote; None if it has not run.
         failed: Words by study, if a study could not run.
         left: Studies that did not run, or not to the end.
+        undrawn: Of files of studies that were not written, "study/file" and why.
     """
 
     folder: Path
@@ -70,6 +71,7 @@ class Reproduction(Summarized):
     results: Mapping[str, dict[str, Any] | None]
     failed: Mapping[str, str] = field(default_factory=dict)
     left: Sequence[str] = ()
+    undrawn: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def page(self) -> Path:
@@ -141,7 +143,7 @@ def reproduce(
             raise CdprError(f"only: study {name!r} is unknown; {closest(name, STUDIES)}")
     older = {} if against is None else _older(Path(against))
     arguments = {"reproduction": names, "quick": quick}
-    failed, left, ran = dict[str, str](), list[str](), list[str]()
+    failed, undrawn, left, ran = dict[str, str](), dict[str, str](), list[str](), list[str]()
     with Folder(Path(folder), arguments, overwrite, grows=True) as results:
         for number, name in enumerate(names):
             if follow.stop():
@@ -162,6 +164,7 @@ def reproduce(
                 follow.say(f"{name}: {failed[name]}")
                 continue
             ran.append(name)
+            undrawn |= {f"{name}/{file}": why for file, why in found.undrawn.items()}
             if found.failed:
                 failed[name] = "; ".join(found.failed.values())
             if found.stopped:
@@ -169,9 +172,9 @@ def reproduce(
         report = reproduction_of(results.path, names, ran, quick, failed, left, older)
         results.write_text(VERDICTS_FILE, _json(_verdicts(report.facts())))
         results.write_text(PAGE, page_of(report))
-        if not failed and not left:
+        if not failed and not left and not undrawn:
             results.complete()
-    return report
+    return replace(report, undrawn=undrawn)
 
 
 def _named(follow: Follow, words: str) -> Follow:

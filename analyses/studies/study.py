@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
 from pathlib import Path
@@ -205,6 +205,8 @@ def run_study(
             found.undrawn.update(found.write(results, formats, follow.stop))
             if not found.interrupted and not found.undrawn:
                 results.complete()
+            elif found.undrawn and follow.stop():
+                found = replace(found, stopped=True)
     return found
 
 
@@ -258,7 +260,7 @@ class StudyResult(Summarized):
         failed: Words by digest of calls that raised, or whose process died.
         undrawn: Of files that were not written, the name and why.
         folder: The results folder; None if nothing was kept.
-        stopped: True if it was stopped before all rows were measured.
+        stopped: True if it was stopped before all was measured and drawn.
     """
 
     study: Study

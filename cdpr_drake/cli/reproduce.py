@@ -85,6 +85,8 @@ def reproduce(
     console = message_console()
     for name, words in report.failed.items():
         console.print(f"cdpr: study failed: {name}: {words}")
+    for file, why in report.undrawn.items():
+        console.print(f"cdpr: {folder / file}: not written: {why}")
     if pdf and printed is None:
         console.print("cdpr: --pdf: no browser here prints; open the page in one and print it")
     if report.left:
@@ -92,7 +94,7 @@ def reproduce(
         return INTERRUPTED
     if report.failed:
         return STUDY_FAILED
-    return INCOMPLETE if pdf and printed is None else 0
+    return INCOMPLETE if report.undrawn or (pdf and printed is None) else 0
 
 
 def _print(report: Reproduction) -> None:

@@ -97,6 +97,17 @@ def test_a_figure_that_fails_is_named_and_costs_no_other(run, toy, here):
     assert "cdpr: r/first.png: not written: no such colour\n" in err
     assert squares(here / "r") == [0.0, 1.0, 4.0, 9.0]
     assert {path.name for path in (here / "r").glob("*.*g")} == {"good.png", "good.svg"}
+    code, _, err = run("reproduce", "--only", "toy", "--out", "all")
+    assert (code, "cdpr: all/toy/first.png: not written: no such colour\n" in err) == (3, True)
+
+
+@BOTH
+def test_a_stop_before_the_figures_leaves_them_to_the_same_command(run, toy, here, words):
+    toy(figures={"first": lambda rows: (signals(signal.SIGINT)(), line(rows))[1], "good": line})
+    code, _, err = run(*words)
+    assert (code, "good.png: not written: not begun" in err) == (130, True)
+    toy()
+    assert run(*words)[0] == 0
 
 
 @BOTH
