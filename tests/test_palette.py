@@ -65,6 +65,6 @@ def test_red_green_blue():
 def test_no_figure_chooses_colours_of_its_own(path):
     """Numbered colours of matplotlib mean another thing in every figure; greys mean nothing."""
     found = re.findall(
-        r"""["']C\d["']|f["']C\{|color=["'](?:tab:|[rgbcmy]["'])""", path.read_text()
+        r"""["']C\d["']|color=f["']C\{|color=["'](?:tab:|[rgbcmy]["'])""", path.read_text()
     )
     assert not found

@@ -8,6 +8,7 @@ from cdpr_drake.analyses.front.simulated_fits import (
     identify_in_simulation,
 )
 from cdpr_drake.analyses.front.simulation import simulate
+from cdpr_drake.analyses.front.workspaces import compute_workspace
 from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
@@ -33,9 +34,9 @@ NOWHERE = "192.0.2.1"
          "allow overwrite", "allow --overwrite"),
         (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
          ["study", "case-9", "--scheduler", "tcp://127.0.0.1:1"],
-         "workers tcp://127.0.0.1:1: does not answer",
-         "--scheduler tcp://127.0.0.1:1: does not answer"),
-        (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
+         "workers: tcp://127.0.0.1:1 does not answer",
+         "--scheduler: tcp://127.0.0.1:1 does not answer"),
+        (lambda: compute_workspace("planar", grid=(2, 2, 1), workers="tcp://127.0.0.1:1"),
          ["workspace", "planar", "--grid", "2,2,1", "--scheduler", "tcp://127.0.0.1:1"],
          "leave out workers", "leave out --scheduler"),
         (lambda: open_meshcat(port=1), ["view", "planar", "--port", "1"],
