@@ -97,7 +97,7 @@ class RowStore:
         arrays = {key: value for key, value in row.items() if isinstance(value, np.ndarray)}
         if arrays:
             with self.folder.file(f"{ARRAYS}/{name}.npz") as part, part.open("wb") as file:
-                np.savez_compressed(file, allow_pickle=False, **arrays)
+                np.savez_compressed(file, **arrays)
         words = plain({key: value for key, value in row.items() if key not in arrays})
         with self.folder.writing():
             if self._file is None:
