@@ -94,7 +94,7 @@ class RowStore:
         Raises:
             OutputFolderError: It cannot be written.
         """
-        arrays = {key: value for key, value in row.items() if isinstance(value, np.ndarray)}
+        arrays: dict[str, Any] = {k: a for k, a in row.items() if isinstance(a, np.ndarray)}
         if arrays:
             with self.folder.file(f"{ARRAYS}/{name}.npz") as part, part.open("wb") as file:
                 np.savez_compressed(file, **arrays)
