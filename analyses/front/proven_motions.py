@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.motions_in_time import (
     DrawnTimedPlan,
     check_timed,
@@ -28,7 +29,6 @@ from cdpr_drake.analyses.front.planning import (
     silent,
     tracked_by,
 )
-from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.planning.proven_plan_results import ProvenRun
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.analyses.workspaces.proven_sets import (

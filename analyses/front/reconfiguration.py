@@ -18,8 +18,8 @@ from cdpr_drake.analyses.design.reconfiguration import (
     put_rails,
     reconfigured,
 )
-from cdpr_drake.analyses.front.planning import PathPoses, Say, path_poses
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.front.planning import PathPoses, Say, path_poses
 from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.errors import PlanningError, WrenchSetError

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
 from cdpr_drake.analyses.front.workspaces import pose_grid, stopped
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS

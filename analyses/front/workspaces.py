@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.front.session import Say, Session, asked_workers, kept_folder
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
 from cdpr_drake.analyses.reporting.log_files import write_json
