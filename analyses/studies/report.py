@@ -273,7 +273,7 @@ def _verdicts(facts: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 def _older(path: Path) -> dict[str, str]:
     file = path / VERDICTS_FILE if path.is_dir() else path
     found = _read_json(file)
-    if found is None:
+    if not isinstance(found, dict):
         raise CdprError(f"against: {path}: found no {VERDICTS_FILE}; accepted: a report's folder")
     return found
 

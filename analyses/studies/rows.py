@@ -127,10 +127,23 @@ class RowStore:
 
 
 def read_rows(folder: Path) -> dict[str, dict[str, Any]]:
-    """Rows of a folder by digest; a line that a kill has cut does not count."""
+    """Rows of a folder by digest; a line that a kill has cut does not count.
+
+    Raises:
+        CdprError: A line is none that this program wrote.
+    """
     path = folder / ROWS
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    return dict(load_json(line) for line in lines if line.endswith("\n"))
+    rows = {}
+    for number, line in enumerate(lines, 1):
+        if not line.endswith("\n"):
+            continue
+        try:
+            name, row = load_json(line)
+            rows[str(name)] = dict(row)
+        except (ValueError, TypeError) as problem:
+            raise CdprError(f"{path}: line {number}: found no row of a study") from problem
+    return rows
 
 
 def check_earlier(folder: Path, arguments: Mapping[str, Any]) -> None:

@@ -211,6 +211,14 @@ REFUSED = {
 }
 
 
+@pytest.mark.parametrize("text", ["nonsense\n", "[1]\n", "3\n", '["a", 1]\n', '["a", "b", {}]\n'])
+def test_rows_of_nonsense_are_one_line(tmp_path, text):
+    run(tmp_path / "old")
+    (tmp_path / "old" / ROWS).write_text(text)
+    with pytest.raises(CdprError, match=r"rows.jsonl: line 1: found no row of a study"):
+        run(tmp_path / "new", runs_from=tmp_path / "old")
+
+
 @pytest.mark.parametrize(("call", "words"), REFUSED.values(), ids=REFUSED)
 def test_refusal(tmp_path, call, words):
     with pytest.raises(CdprError, match=words) as caught:
