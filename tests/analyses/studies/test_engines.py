@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.studies import engines
+from cdpr_drake.analyses.studies.study import Form
+from cdpr_drake.systems.diagrams.load import load_scenario
 
 
 def test_methods_have_their_orders():
@@ -41,3 +43,11 @@ def test_a_distance_of_states_is_of_places_and_turns():
     distance, angle = engines.state_distance(state[np.newaxis], turned[np.newaxis])
     assert distance == pytest.approx(0.5)
     assert angle == pytest.approx(0.2)
+
+
+def test_every_scenario_is_one_that_both_engines_run():
+    names = [case.keys.get("scenario") for case in engines.cases(Form(quick=False))]
+    found = [name for name in names if name is not None]
+    assert {"acrobot_pbvs", "caroca_slack_start_tca"} < set(found)
+    for name in found:
+        load_scenario(name, ["integration.engine=compiled"])
