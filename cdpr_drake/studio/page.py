@@ -61,14 +61,13 @@ def _build(bench: Workbench) -> None:
                 ui.tab(panel.name, label=panel.title, icon=panel.icon).mark(f"tab-{panel.name}")
         _place_subject(bench)
         turn = ui.button(icon="contrast").props("flat round dense color=white")
-        turn.props('aria-label="Dark or light" title="Dark or light"')
+        turn.mark("dark-or-light").props('aria-label="Dark or light" title="Dark or light"')
 
     def show(is_dark: bool) -> None:
         bench.dark = is_dark
         dark.value = is_dark
         bench.draw(lambda scene: scene.set_dark(is_dark))
 
-    turn.on_click(lambda: show(not bench.dark))
     _undo_by_keys(bench)
     with ui.element("div").classes("studio-main"):
         pages = PanelPages(bench, tabs, shown)
@@ -81,6 +80,11 @@ def _build(bench: Workbench) -> None:
             with suppress(TimeoutError):  # a browser that is gone already
                 show(bool(await ui.run_javascript(PREFERS_DARK, timeout=10.0)))
 
+    async def turn_over() -> None:
+        await ask_for_dark()  # a click may come before the answer
+        show(not bench.dark)
+
+    turn.on_click(turn_over)
     ui.context.client.on_connect(pages.begin)
     ui.context.client.on_connect(ask_for_dark)
 

@@ -10,11 +10,18 @@ from tests.studio.run_page import press
 
 TITLES = ("Robot", "Pose", "Workspace", "Run", "Logs", "Studies")
 
-SHOWS = """[...document.querySelectorAll('.q-tab-panel')]
-    .some(e => e.checkVisibility() && e.innerText.trim().length > 40)"""
-"""A panel is there with its words."""
+SHOWS = """(() => {
+    const panels = [...document.querySelectorAll('.q-tab-panel')];
+    return panels.length === 1 && panels[0].checkVisibility() &&
+        panels[0].innerText.trim().length > 40 && document.getAnimations().every(
+            one => one.playState !== 'running' || one.effect.getTiming().iterations === Infinity);
+})()"""
+"""One panel is there with its words; none comes in or goes."""
 
 DARK = "document.body.classList.contains('body--dark')"
+
+CHOSEN_DARK = f"{DARK} && Quasar.Dark.mode === true"
+"""The server knows what the browser likes; before, the page follows the browser by itself."""
 
 STARTS = "[...document.querySelectorAll('button')].some(e => e.checkVisibility() && \
 e.innerText.includes('Start'))"
@@ -59,12 +66,19 @@ def page(started_browser, studio):
         try:
             look(browser, "1280", dark=True)
             browser.get(studio[1])
-            wait_for(browser, f"{SHOWS} && {DARK}")  # as the browser likes it
+            wait_for(browser, f"{SHOWS} && {CHOSEN_DARK}")  # as the browser likes it
             browser.execute_script(NO_SCENE)
             yield browser
         finally:
             browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def turn_to(page, title):
+    """Opens a tab, and waits until it is there."""
+    press(page, title)
+    active = "(document.querySelector('.q-tab--active .q-tab__label') || {}).textContent"
+    wait_for(page, f"{active} === '{title}' && {SHOWS}")
 
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
@@ -81,8 +95,7 @@ def test_no_tab_has_serious_findings(page, size, dark):
     wait_for(page, f"innerWidth {'<' if size == 'phone' else '>'} 400")
     found = {}
     for title in TITLES:
-        press(page, title)
-        wait_for(page, SHOWS)
+        turn_to(page, title)
         found[title] = axe.grave(page)
     assert found == {title: [] for title in TITLES}
 
@@ -90,7 +103,7 @@ def test_no_tab_has_serious_findings(page, size, dark):
 @pytest.mark.parametrize("panel", ["Workspace", "Run"])
 def test_a_phone_shows_all_of_a_panel(page, panel):
     look(page, "phone", dark=False)
-    press(page, panel)
+    turn_to(page, panel)
     wait_for(page, STARTS)
     wait_for(page, "innerWidth < 400")
     assert page.execute_script(f"return {OUTSIDE}") == []
@@ -102,7 +115,7 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page):
     from selenium.webdriver.common.keys import Keys
 
     look(page, "1280", dark=False)
-    press(page, "Studies")
+    turn_to(page, "Studies")
     wait_for(page, "document.querySelector('input[aria-label=\"seeds\"]') !== null")
     page.execute_script("document.activeElement.blur()")
     seen, unseen = set(), []
@@ -126,7 +139,7 @@ def test_all_of_the_page_is_reached_by_keys_and_focus_is_seen(page):
 
 def test_axe_sees_what_is_wrong(page):
     look(page, "1280", dark=False)
-    press(page, "Robot")
+    turn_to(page, "Robot")
     page.execute_script(FAULTS)
     rules = {line.partition(":")[0] for line in axe.grave(page)}
     assert {"button-name", "color-contrast"} <= rules

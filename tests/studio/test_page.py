@@ -1,5 +1,6 @@
 """The page's panels, by a simulated user: what they show, what they change, what they refuse."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 
 from cdpr_drake.models.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.page import PREFERS_DARK
 from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
@@ -55,6 +57,14 @@ async def test_a_wrong_value_is_said_beside_its_field(user, bench, name, words, 
     assert any(said in problem for problem in problems(user)), problems(user)
     assert bench.robot.text == text
     assert "error" in field(user, f"cell-{name}").props
+
+
+async def test_a_click_before_the_browser_says_that_it_is_dark_makes_the_page_light(user, bench):
+    bench.dark = None
+    user.javascript_rules[re.compile(re.escape(PREFERS_DARK))] = lambda _: True
+    user.find(marker="dark-or-light").click()
+    await until(lambda: bench.dark is not None)
+    assert bench.dark is False
 
 
 async def test_wrong_values_and_files_at_random_are_refused_in_words(user, bench):
