@@ -40,8 +40,9 @@ class Folder:
     """
 
     def __init__(
-        self, path: Path, arguments: Mapping[str, Any], overwrite: bool = False, grows: bool = False
-    ) -> None:
+        self, path: Path, arguments: Mapping[str, Any], overwrite: bool = False,
+        grows: bool = False, elsewhere: str = "name another folder",
+    ) -> None:  # fmt: skip
         """Checks the path; nothing is written before the block.
 
         Args:
@@ -49,13 +50,14 @@ class Folder:
             arguments: All that the results depend on, for JSON.
             overwrite: True to remove results of other arguments, and complete ones, first.
             grows: True if complete results of the same arguments may get more, or be read again.
+            elsewhere: What one does, other than to overwrite, if other results are there.
 
         Raises:
             OutputFolderError: The path is a file, a mount point, or the working folder or above it.
         """
         self.path, self.resumed = Path(path).absolute(), False
         self._arguments: Any = load_json(json.dumps(arguments))
-        self._overwrite, self._grows = overwrite, grows
+        self._overwrite, self._grows, self._elsewhere = overwrite, grows, elsewhere
         self._files: list[str] = []
         self._made: list[Path] = []
         self._open_now = False
@@ -109,7 +111,7 @@ class Folder:
             if not self.resumed and not self._overwrite:
                 words = "; ".join(different[:3]) or "these are complete"
                 raise OutputFolderError(
-                    f"{self.path}: holds other results: {words}; name another folder or allow "
+                    f"{self.path}: holds other results: {words}; {self._elsewhere} or allow "
                     "overwrite"
                 )
             self._files = marker["files"]

@@ -51,6 +51,8 @@ RESULTS = "results.json"
 MOST_SEEDS = 10_000
 """Every row of a study is listed before the first is measured."""
 
+ELSEWHERE = "name another folder, and this one by runs_from, which takes over equal calls,"
+
 UNITS = {
     "m": "m", "m2": "m^2", "m3": "m^3", "rad": "rad", "deg": "deg", "px": "px", "s": "s", "n": "N",
     "n_m": "N m", "n2": "N^2", "m_s": "m/s", "rad_s": "rad/s", "m_s2": "m/s^2", "kg": "kg",
@@ -186,7 +188,9 @@ def run_study(
             where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
         else:
             where = Path(folder)
-        results = stack.enter_context(Folder(where, arguments, overwrite, grows=True))
+        results = stack.enter_context(
+            Folder(where, arguments, overwrite, grows=True, elsewhere=ELSEWHERE)
+        )
         rows = stack.enter_context(RowStore(results))
         if runs_from is not None:
             rows.take_over(Path(runs_from))
@@ -317,7 +321,15 @@ class StudyResult(Summarized):
         """What draws its figures, by name."""
         if not self.records:
             return {}
-        return {name: partial(draw, self.rows) for name, draw in self.study.figures.items()}
+        return {name: partial(self._drawn, draw) for name, draw in self.study.figures.items()}
+
+    def _drawn(self, draw: Callable[[Frame], Figure]) -> Figure:
+        """A figure that says if it shows less than the study's full form."""
+        figure = draw(self.rows)
+        marks = ["quick form"] * self.form.quick
+        marks += [f"{len(self.records)} of {self.planned} rows"] * self.interrupted
+        figure.text(0.998, 0.002, ", ".join(marks), ha="right", va="bottom", fontsize="small")
+        return figure
 
     def plot(self, name: str | None = None) -> Figure:
         """A figure of the study.

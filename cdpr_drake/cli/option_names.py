@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 SHARED_OPTIONS = {
     "overwrite": "--overwrite",
+    "runs_from": "--runs-from",
     "overrides": "--set",
     "workers": "--scheduler",
     "camera.kind=projected": "--camera projected",

@@ -91,6 +91,11 @@ def test_results_have_rows_units_numbers_facts_and_tables(tmp_path):
     assert (tmp_path / "r" / "line.png").is_file()
 
 
+def test_a_figure_says_that_it_shows_less_than_the_full_form():
+    words = [run(quick=quick).plot().texts[0].get_text() for quick in (True, False)]
+    assert words == ["quick form", ""]
+
+
 def test_the_same_call_measures_nothing_again_and_more_seeds_only_these(tmp_path):
     run(tmp_path / "r")
     CALLS.clear()
@@ -193,7 +198,7 @@ def test_rows_of_other_code_are_refused_or_taken_over(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "code_version", lambda: "old")
     run(tmp_path / "old")
     monkeypatch.undo()
-    with pytest.raises(OutputFolderError, match="code is"):
+    with pytest.raises(OutputFolderError, match=r"code is.*by runs_from"):
         run(tmp_path / "old")
     CALLS.clear()
     result = run(tmp_path / "new", runs_from=tmp_path / "old", seeds=3)
