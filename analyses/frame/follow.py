@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -42,11 +43,13 @@ class Follow:
         progress: Called at the start and after each piece.
         stop: Asked often; True ends the work after the pieces under way, and what is done is kept.
         say: Gets a line on what happens.
+        results: Folder below which results are kept that nobody gave a folder; None: none are.
     """
 
     progress: Callable[[Progress], None] = lambda progress: None
     stop: Callable[[], bool] = lambda: False
     say: Callable[[str], None] = lambda words: None
+    results: Path | None = None
 
 
 NOBODY = Follow()

@@ -1,33 +1,32 @@
-"""The `cdpr` command: its subcommands, and how errors reach the user."""
+"""The `cdpr` command: makes subcommands of verbs, runs one, shows its result or why there is none.
+
+What a subcommand accepts stands in the signature and the docstring of its verb, see `COMMANDS`.
+"""
 
 from __future__ import annotations
 
-import ast
 import faulthandler
 import gc
-import keyword
+import inspect
+import json as js
 import logging
 import os
 import re
 import signal
 import sys
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
-from importlib import import_module
-from importlib.util import find_spec
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, nullcontext, suppress
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn, get_args
 
-import typer
-from typer.core import TyperGroup
+from cyclopts import App, CoercionError, CycloptsError, Group, MissingArgumentError, Parameter
 
 from cdpr_drake.blas_threads import ONE_THREAD, one_blas_thread, started_with_one_thread
-from cdpr_drake.cli.command_help import COMMANDS, examples_of, first_steps, groups
-from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
-from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
+from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
+from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
-from cdpr_drake.errors import CdprError, plain_words
+from cdpr_drake.errors import CdprError, StoppedError, accepted_names, plain_words
 from cdpr_drake.kernel_cache.locks import share_compilation
 from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.version import __version__
@@ -41,167 +40,189 @@ LONGEST_LINE = 490
 LIVING = "studio"
 """The subcommand that goes on while files change; any other reads each file once."""
 
-BAD_INPUT = 2
-"""Exit code when the user's input is not accepted."""
+BAD_INPUT, INCOMPLETE = 2, 3
+"""Exit codes: the input is not accepted; numbers are complete, and a figure is missing."""
 
-_UsageProblem: type[Exception] = next(
-    kind for kind in typer.BadParameter.__mro__ if kind.__name__ == "ClickException"
-)
-"""Base of what typer raises for wrong options; typer may bring its own copy of click."""
+PICTURES = ("png", "pdf", "svg", "jpg", "jpeg", "tif", "tiff", "webp", "eps", "ps", "pgf")
+"""Endings of files of --plot."""
 
+KINDS = {int: "a whole number", float: "a number", bool: "true or false"}
+"""What words of an option have to be, by the type of its argument."""
 
-def _function_of(name: str) -> str:
-    """Name of a subcommand's function, and of its module: `import` is a word of Python."""
-    return f"{name}_" if keyword.iskeyword(name) else name.replace("-", "_")
+SHARED = Group("Of all commands", sort_key=100)
 
 
-SUBCOMMANDS = {name: f"cdpr_drake.cli.{_function_of(name)}" for name in COMMANDS}
-"""Subcommands in the order of the help, each with the module whose function of that name it is.
-
-What a subcommand prints as help is the function's docstring, or what the module's `help_words`
-returns, where that follows from a table."""
-
-
-class _Interrupted(Exception):
-    """A Ctrl-C with what was noted on it, of which typer would make a mere exit code."""
-
-
-class _Subcommands(TyperGroup):
-    """Lets a Ctrl-C through; its help has the whole first line of each subcommand."""
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        for title, names in groups().items():
-            helps = [(name, self.commands[name].help or "") for name in names]
-            with formatter.section(title):
-                formatter.write_dl([(name, help.partition("\n\n")[0]) for name, help in helps])
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt as problem:
-            interrupted = _Interrupted()
-            for note in getattr(problem, "__notes__", ()):
-                interrupted.add_note(note)
-            raise interrupted from problem
-
-
-def make_app(arguments: Sequence[str] = ()) -> typer.Typer:
-    """The command with the subcommands that the table has now.
-
-    Only the subcommand that is asked for is imported: Drake alone takes as long as all else that a
-    question such as `cdpr --help` needs. Of the others the help has the first line; where the very
-    first word is a subcommand nobody sees that help, and none of them is there.
-    """
-    given = asked_words() or arguments
-    asked = next((word for word in given if not word.startswith("-")), None)
-    only = asked_words() is None and asked in SUBCOMMANDS and given[0] == asked
-    app = typer.Typer(
-        name=PROGRAM,
-        cls=_Subcommands,
-        help="Cable-driven parallel robots in Drake.",
-        invoke_without_command=True,
-        # markdown leaves units such as [m] alone; the plain list of subcommands takes half the time
-        rich_markup_mode="markdown" if only else None,
-        pretty_exceptions_enable=False,
-        callback=_options,
-    )
-    for name, where in SUBCOMMANDS.items():
-        if only and name != asked:
-            continue
-        words = None if name == asked else _first_line(name, where)
-        if words is not None:
-            app.command(name, help=words)(_not_imported)
-            continue
-        names_only = stand_in(name)
-        if names_only is not None:
-            app.command(name)(names_only)
-            continue
-        module = import_module(where)
-        help_words = getattr(module, "help_words", lambda: None)()
-        function = getattr(module, _function_of(name))
-        app.command(name, help=help_words, epilog=examples_of(name))(function)
+def make_app(given: Sequence[str]) -> App:
+    """The command. Of subcommands that are not asked for, the help has the first line only."""
+    asked = next((word for word in given if not word.startswith("-")), "")
+    app = App(
+        name="cdpr", help="Cable-driven parallel robots in Drake.", version=_version,
+        help_format="markdown" if asked else "plaintext", help_flags=("--help",),
+        default_parameter=Parameter(negative_iterable=(), negative_none=()),
+    )  # fmt: skip
+    titles = dict.fromkeys(command.group for command in COMMANDS.values())
+    groups = {title: Group(title, sort_key=k) for k, title in enumerate(titles)}
+    for name, command in COMMANDS.items():
+        words = {} if name == asked else {"help": command.line}
+        examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
+        app.command(
+            command.verb, name=name, group=groups[command.group], help_epilogue=examples, **words
+        )
+    app.default(_show_first_steps)
+    app.register_install_completion_command(name="completion", group=groups["Tools"])
     return app
 
 
-def _not_imported() -> None:
-    """Stands for a subcommand that was not asked for."""
-
-
-def _first_line(name: str, where: str) -> str | None:
-    """First line of a subcommand's docstring, from its source; None where that cannot be read."""
-    try:
-        found = find_spec(where)
-        source = Path(str(found and found.origin)).read_text(encoding="utf-8")
-    except (OSError, ImportError, ValueError):
-        return None
-    for node in ast.parse(source).body:
-        if isinstance(node, ast.FunctionDef) and node.name == _function_of(name):
-            return (ast.get_docstring(node) or "").partition("\n\n")[0]
-    return None
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        from importlib.metadata import version
-
-        print(f"cdpr_drake {__version__}, Drake {version('drake')}")
-        raise typer.Exit
-
-
-def _options(
-    context: typer.Context,
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version",
-            callback=_show_version,
-            is_eager=True,
-            help="Print the versions of the package and of Drake.",
-        ),
-    ] = False,
-) -> None:
-    """Cable-driven parallel robots in Drake."""
-    if context.invoked_subcommand is None:
-        print(first_steps())
-        raise typer.Exit
-
-
-PARSED = {
-    "int_parsing": "a whole number", "int_from_float": "a whole number",
-    "int_parsing_size": "a whole number of fewer digits", "float_parsing": "a number",
-}  # fmt: skip
-"""What options take, by pydantic's names of what is wrong with a value."""
-
-BOUNDS = {
-    "greater_than_equal": ("ge", "at least"), "less_than_equal": ("le", "at most"),
-    "greater_than": ("gt", "above"), "less_than": ("lt", "below"),
-}  # fmt: skip
-"""The bound that a value misses, by the same: its key, and words."""
-
-
-def _accepted(refused: dict[str, Any]) -> str:
-    """What is accepted in the place of a value that pydantic refused; empty: it says so itself."""
-    if refused["type"] in BOUNDS:
-        key, words = BOUNDS[refused["type"]]
-        return f"{words} {refused['ctx'][key]:g}"
-    return PARSED.get(refused["type"], "")
-
-
-def _usage_words(problem: Exception) -> str:
-    """What typer says about options in one line, with the value found and where there is help."""
-    words = str(getattr(problem, "format_message", problem.__str__)()).rstrip(".")
-    # Where pydantic refused a value, typer keeps it to itself.
-    refused: list[dict[str, Any]] = getattr(problem.__cause__, "errors", list)()
-    if refused and "input" in refused[0]:
-        option = re.match(r"Invalid value for '?([^':]+)'?:", words)
-        accepted = _accepted(refused[0])
-        if option is not None and accepted:
-            words = f"{option[1]}: found {refused[0]['input']!r}; accepted: {accepted}"
+def _joined(given: Sequence[str]) -> list[str]:
+    """Words of a command line in which a negative number belongs to the option before it."""
+    words: list[str] = []
+    for word in given:
+        if re.match(r"-[\d.]", word) and words and re.fullmatch(r"--[a-z-]+", words[-1]):
+            words[-1] += f"={word}"
         else:
-            words += f"; found {refused[0]['input']!r}"
-    context = getattr(problem, "ctx", None)
-    command = "" if context is None or context.parent is None else f"{context.info_name} "
-    return f"{words}; see cdpr {command}--help"
+            words.append(word)
+    return words
+
+
+def _version() -> str:
+    from importlib.metadata import version
+
+    return f"cdpr_drake {__version__}, Drake {version('drake')}"
+
+
+def _show_first_steps() -> None:
+    width = max(map(len, FIRST_STEPS))
+    steps = (f"  {line:<{width}}  {words}" for line, words in FIRST_STEPS.items())
+    print("Cable-driven parallel robots in Drake. To begin:", "", *steps, sep="\n")
+    print("\ncdpr --help lists the rest.")
+
+
+class _Call:
+    """One call of the command.
+
+    Attributes:
+        options: Options of its verb by the names of arguments, for messages.
+    """
+
+    def __init__(self, imported: Callable[[], None]) -> None:
+        self.options: dict[str, str] = {}
+        self._imported = imported
+
+    def run(self, given: Sequence[str]) -> int:
+        """Runs the subcommand, and returns the exit code."""
+        app = make_app(given)
+
+        @app.meta.default
+        def meta(
+            *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
+            json: Annotated[
+                bool, Parameter(negative=(), group=SHARED, show_default=False)
+            ] = False,
+            plot: Annotated[
+                list[str] | None, Parameter(metavar="[FIGURE=]FILE", group=SHARED, n_tokens=1)
+            ] = None,
+        ) -> int:
+            """Runs a subcommand.
+
+            Args:
+                json: Print the result as JSON.
+                plot: Draw the result, or one of its figures by name; the ending of the file says
+                    how. May be repeated.
+            """
+            verb, bound, unparsed = app.parse_args(words, exit_on_error=False, print_error=False)
+            self._imported()
+            figures = dict(map(_figure_file, plot or []))
+            return self._answer(words, verb, bound, unparsed, json, figures)
+
+        code = app.meta(
+            _joined(given), result_action="return_value", exit_on_error=False, print_error=False
+        )
+        return code if isinstance(code, int) else 0
+
+    def _answer(
+        self, words: Sequence[str], verb: Callable[..., Any], bound: inspect.BoundArguments,
+        unparsed: Mapping[str, Any], json: bool, figures: Mapping[str, Path],
+    ) -> int:  # fmt: skip
+        from cdpr_drake.cli.following import following
+        from cdpr_drake.cli.terminal import message_console, wide_console
+
+        name = words[0] if words else ""
+        self.options = options_of(verb)
+        for argument, value in bound.arguments.items():
+            if isinstance(value, float) and value - value != 0.0:
+                option = self.options.get(argument, argument)
+                raise CdprError(f"{option}: found {value}; accepted: a finite number")
+        console = message_console()
+        with ExitStack() as stack:
+            stack.enter_context(nullcontext() if name == LIVING else inputs_read_once())
+            follow = stack.enter_context(following(name, "follow" in unparsed, self.options))
+            if "follow" in unparsed:
+                bound.arguments["follow"] = follow
+            result = verb(*bound.args, **bound.kwargs)
+            for figure, path in figures.items():
+                _save(result.plot(figure or None), path)
+        if result is None or isinstance(result, int):
+            return result or 0
+        if json:
+            print(js.dumps(result.as_dict(), indent=2))
+        else:
+            result.show(wide_console())
+        failed = getattr(result, "failed", {})
+        for file, why in failed.items():
+            console.print(f"cdpr: {file}: not written: {why}")
+        return result.exit_code or (INCOMPLETE if failed else 0)
+
+
+def options_of(verb: Callable[..., Any]) -> dict[str, str]:
+    """Options of a verb by the names of its arguments that have a default."""
+    found = {}
+    for argument, parameter in inspect.signature(verb, eval_str=True).parameters.items():
+        if parameter.default is parameter.empty:
+            continue
+        names = [
+            name for part in get_args(parameter.annotation)[1:]
+            if isinstance(part, Parameter) for name in part.name or ()
+        ]  # fmt: skip
+        found[argument] = names[0] if names else f"--{argument.replace('_', '-')}"
+    return found
+
+
+def _figure_file(word: str) -> tuple[str, Path]:
+    """Name of a figure, empty for the first, and its file; refused before anything is computed."""
+    name, _, file = word.rpartition("=")
+    path = Path(file)
+    if path.suffix[1:].lower() not in PICTURES:
+        raise CdprError(f"--plot: {path}: found the ending {path.suffix!r}; accepted: "
+                        f"{', '.join(PICTURES)}")  # fmt: skip
+    if not path.parent.is_dir():
+        raise CdprError(f"--plot: {path}: cannot be written: there is no folder {path.parent}")
+    return name, path
+
+
+def _save(figure: Any, path: Path) -> None:
+    from cdpr_drake.analyses.visualization.figure_files import save_figure
+
+    save_figure(figure, path)
+
+
+def _usage_words(problem: CycloptsError, given: Sequence[str]) -> str:
+    """What is wrong with a command line, in one line with the value found and what is accepted."""
+    name = next((word for word in given if word in COMMANDS), "")
+    words = " ".join(str(problem).split()).rstrip(".")
+    token = getattr(problem, "token", None)
+    if isinstance(problem, CoercionError) and token is not None and problem.argument is not None:
+        option = token.keyword or problem.argument.name
+        choices = problem.argument.get_choices()
+        kinds = get_args(problem.argument.hint) or (problem.argument.hint,)
+        kind = next((KINDS[kind] for kind in kinds if kind in KINDS), "")
+        accepted = accepted_names(token.value, choices) if choices else f"accepted: {kind}"
+        if choices or kind:
+            words = f"{option}: found {token.value!r}; {accepted}"
+    elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
+        required = problem.argument.field_info.required
+        option = problem.argument.name.lstrip("-").upper() if required else problem.argument.name
+        words = f"{option}: found nothing; accepted: a value"
+    return f"{words}; see cdpr {name} --help".replace("  ", " ")
 
 
 def _is_error(record: logging.LogRecord) -> bool:
@@ -211,8 +232,7 @@ def _is_error(record: logging.LogRecord) -> bool:
 
 def _notes(problem: BaseException) -> str:
     """What was noted on a problem on its way here, such as where the log of a run is kept."""
-    notes = getattr(problem, "__notes__", ())
-    return "".join(f"; {with_options(note, SHARED_OPTIONS)}" for note in notes)
+    return "".join(f"; {note}" for note in getattr(problem, "__notes__", ()))
 
 
 def _refuse(words: str) -> NoReturn:
@@ -225,6 +245,11 @@ def _refuse(words: str) -> NoReturn:
     sys.exit(BAD_INPUT)
 
 
+def _stop(problem: BaseException) -> NoReturn:
+    print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
+    sys.exit(INTERRUPTED)
+
+
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2.
 
@@ -235,7 +260,7 @@ def main(arguments: list[str] | None = None) -> None:
     if arguments is not None:  # somebody else's process
         held = one_blas_thread() if "numpy" in sys.modules else nullcontext()
         with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
-            _main(arguments)
+            _main(arguments, lambda: None)
         return
     os.environ.update(ONE_THREAD)  # before NumPy is loaded
     for each in SIGNALS:
@@ -277,8 +302,8 @@ def _was_interrupted(problem: BaseException) -> bool:
     return cause is not None
 
 
-def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> None:
-    """Runs the command, and ends by SystemExit; `imported` is called before the subcommand is."""
+def _main(given: Sequence[str], imported: Callable[[], None]) -> NoReturn:
+    """Runs the command, and ends by SystemExit; `imported` is called before the verb is."""
     exit_with_parent()
     # A filter, as Drake sets the level itself when a subcommand imports it.
     logging.getLogger("drake").addFilter(_is_error)
@@ -287,33 +312,32 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
             faulthandler.enable(sys.stderr)  # a crash of a library is never silent
     encoding = sys.getfilesystemencoding()
     if encoding != "utf-8":  # Drake does not start there
-        print(
-            f"cdpr: found a locale with the encoding {encoding}; accepted: one with UTF-8, such as "
-            "LC_ALL=C.UTF-8",
-            file=sys.stderr,
-        )
-        sys.exit(BAD_INPUT)
+        _refuse(f"found a locale with the encoding {encoding}; accepted: one with UTF-8, such as "
+                "LC_ALL=C.UTF-8")  # fmt: skip
+    compile_ahead(given)
+    share_compilation()
+    call = _Call(imported)
+    if given and given[0] not in COMMANDS and given[0] not in ("--help", "--version"):
+        from cdpr_drake.cli import old_app
+
+        old_app._main(given, imported)
     try:
-        if asked_words() is None:
-            compile_ahead(given)
-        app = make_app(given)  # which imports Drake and numba if the subcommand does
-        share_compilation()
-        imported()
-        with nullcontext() if LIVING in given else inputs_read_once():
-            code = app(args=given, prog_name=PROGRAM, standalone_mode=False)
+        sys.exit(call.run(given))
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")
+    except StoppedError as problem:
+        print(f"cdpr: {plain_words(str(problem))}", file=sys.stderr)
+        sys.exit(INTERRUPTED)
     except CdprError as problem:
-        _refuse(f"{with_options(str(problem), SHARED_OPTIONS)}{_notes(problem)}")
-    except _UsageProblem as problem:
-        _refuse(_usage_words(problem))
-    except (MemoryError, ArithmeticError, RuntimeError, ImportError) as problem:
+        _refuse(with_options(f"{problem}{_notes(problem)}", call.options))
+    except CycloptsError as problem:
+        _refuse(_usage_words(problem, given))
+    except KeyboardInterrupt as problem:
+        _stop(problem)
+    except (MemoryError, ArithmeticError, RuntimeError) as problem:
         if _was_interrupted(problem):
-            print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
-            sys.exit(INTERRUPTED)
-        if isinstance(problem, ImportError):
-            raise
+            _stop(problem)
         # Numbers that nothing can be computed with, and what Drake refuses. Mistakes of this
         # program, such as KeyError, stay tracebacks.
         if os.environ.get(TRACEBACK):
@@ -321,12 +345,7 @@ def _main(given: Sequence[str], imported: Callable[[], None] = lambda: None) -> 
         kind, words = type(problem).__name__, " ".join(str(problem).split())
         why = f"{words or 'nothing more is known'}; {TRACEBACK}=1 shows where"
         _refuse(f"{kind}: {why}{_notes(problem)}")
-    except (typer.Abort, KeyboardInterrupt, _Interrupted) as problem:
-        print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
-        sys.exit(INTERRUPTED)
     except Exception as problem:  # compilers and compiled modules wrap what they are stopped by
         if not _was_interrupted(problem):
             raise
-        print(f"cdpr: stopped{plain_words(_notes(problem))}", file=sys.stderr)
-        sys.exit(INTERRUPTED)
-    sys.exit(code if isinstance(code, int) else 0)
+        _stop(problem)

@@ -1,0 +1,209 @@
+"""Types of arguments that verbs share: the words of a command line that each of them takes.
+
+A verb names a type once, and its value, option, help, completion and refusals follow from it.
+Callers in Python pass values.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from cyclopts import Parameter, Token
+
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError
+
+FORMATS = ("png", "pdf", "svg")
+"""Endings of the files of figures in results folders."""
+
+MOST_PROCESSES = 4096
+"""Of one machine; a larger number is a mistake."""
+
+
+def words(
+    parse: Callable[[str], Any], accepted: str, metavar: str, *, name: str | None = None,
+    many: bool = False, completer: Callable[[Any], Any] | None = None,
+) -> Parameter:  # fmt: skip
+    """How an option's words become a value.
+
+    Args:
+        parse: Makes a value of one word; a ValueError refuses it.
+        accepted: What is accepted, for the refusal.
+        metavar: What the help shows in the place of the word.
+        name: The option, such as --out; None: the argument's name.
+        many: True if the option may be repeated, and the value is a list.
+        completer: Gives words for completion.
+    """
+
+    def value(token: Token) -> Any:
+        try:
+            return parse(token.value)
+        except ValueError:
+            option = token.keyword or metavar
+            raise CdprError(f"{option}: found {token.value!r}; accepted: {accepted}") from None
+
+    def convert(_kind: Any, tokens: Sequence[Token]) -> Any:
+        return [value(token) for token in tokens] if many else value(tokens[0])
+
+    return Parameter(
+        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer
+    )
+
+
+def numbers(*sizes: int, by: str = ",") -> Callable[[str], Array]:
+    """Makes finite numbers of words with a separator, as many as one of `sizes`; none: any."""
+
+    def parse(word: str) -> Array:
+        found = np.array([float(part) for part in word.split(by)])
+        if (sizes and len(found) not in sizes) or not np.all(np.isfinite(found)):
+            raise ValueError(word)
+        return found
+
+    return parse
+
+
+def pose(word: str) -> Any:
+    """X_WP of x,y,z [m] or x,y,z,phi,theta,psi [m, deg]."""
+    from cdpr_drake.geometry.poses import pose_from_angles
+
+    found = numbers(3, 6)(word)
+    return pose_from_angles(found[:3], np.radians(found[3:] if len(found) == 6 else np.zeros(3)))
+
+
+def box(word: str) -> tuple[Array, Array]:
+    """Lower and upper corner, shape (3,) each, of x0:x1,y0:y1,z0:z1."""
+    spans = np.array([numbers(2, by=":")(part) for part in word.split(",")])
+    if spans.shape != (3, 2) or np.any(spans[:, 0] >= spans[:, 1]) or np.any(abs(spans) > 1e6):
+        raise ValueError(word)
+    return spans[:, 0], spans[:, 1]
+
+
+def names(word: str) -> list[str]:
+    """Names with commas between."""
+    return [part.strip() for part in word.split(",")]
+
+
+def some_names(word: str) -> list[str]:
+    """Names with commas between, or none."""
+    return [] if word.strip() == "none" else names(word)
+
+
+def formats(word: str) -> list[str]:
+    """Endings of files, each once."""
+    found = list(dict.fromkeys(names(word.lower())))
+    if not set(found) <= set(FORMATS):
+        raise ValueError(word)
+    return found
+
+
+def workers(word: str) -> int | str:
+    """A number of processes, or what names a scheduler."""
+    if not word:
+        raise ValueError(word)
+    try:
+        count = int(word)
+    except ValueError:
+        return word
+    if not 1 <= count <= MOST_PROCESSES:
+        raise ValueError(word)
+    return count
+
+
+def named_numbers(word: str) -> tuple[str, Array]:
+    """A name and numbers, of name=value or name=v1,v2."""
+    name, mark, values = word.partition("=")
+    if not (mark and name.strip()):
+        raise ValueError(word)
+    return name.strip(), numbers()(values)
+
+
+def _files(kind: str) -> Callable[[Any], list[str]]:
+    """Completes names of files of a kind that come with the package."""
+    folder = Path(__file__).resolve().parents[2]
+
+    def complete(_context: Any) -> list[str]:
+        if kind == "scenario":
+            return [path.stem for path in (folder / "systems" / "scenarios").glob("*.yaml")]
+        kinds = ("robot", "mechanism") if kind == "either" else (kind,)
+        found = (folder / "models" / "robots").glob("*/*.yaml")
+        return [path.parent.name for path in found if path.stem in kinds]
+
+    return complete
+
+
+def _named(kind: str, metavar: str) -> Parameter:
+    return words(str, f"a {metavar.lower()} by name or file", metavar, completer=_files(kind))
+
+
+RobotWord: TypeAlias = Annotated[Any, _named("robot", "ROBOT")]
+"""A robot by name or file; in Python a `Robot`, too."""
+
+ModelWord: TypeAlias = Annotated[Any, _named("either", "ROBOT")]
+"""A robot or a mechanism by name or file; in Python a `Robot` or `Mechanism`, too."""
+
+ScenarioWord: TypeAlias = Annotated[Any, _named("scenario", "SCENARIO")]
+"""A scenario by name or file."""
+
+PoseWord: TypeAlias = Annotated[
+    Any,
+    words(pose, "x,y,z [m] or x,y,z,phi,theta,psi [m, deg]", "X,Y,Z[,PHI,THETA,PSI]"),
+]
+"""A pose; in Python whatever `as_pose` takes."""
+
+Wrench: TypeAlias = Annotated[
+    Sequence[float] | Array | None,
+    words(numbers(6), "mx,my,mz,fx,fy,fz [N m, N]", "MX,MY,MZ,FX,FY,FZ"),
+]
+Vector: TypeAlias = Annotated[
+    Sequence[float] | Array | None, words(numbers(3), "three numbers with commas", "X,Y,Z")
+]
+Numbers: TypeAlias = Annotated[
+    Sequence[float] | Array | None, words(numbers(), "numbers with commas", "NUMBER,...")
+]
+Limits: TypeAlias = Annotated[
+    tuple[float, float] | None, words(lambda word: tuple(numbers(2)(word)), "lower,upper [N]",
+                                      "LOWER,UPPER"),
+]  # fmt: skip
+Box: TypeAlias = Annotated[
+    tuple[Array, Array] | None,
+    words(box, "lower:upper along x, y and z [m], as in -0.4:0.4,-0.4:0.4,0:1; no number beyond "
+          "1e+06", "X0:X1,Y0:Y1,Z0:Z1"),
+]  # fmt: skip
+Names: TypeAlias = Annotated[Sequence[str], words(names, "names with commas", "NAME,...")]
+SomeNames: TypeAlias = Annotated[
+    Sequence[str] | None, words(some_names, "names with commas, or none", "NAME,...|none")
+]
+Joints: TypeAlias = Annotated[
+    Mapping[str, Any] | None,
+    words(named_numbers, "name=value, or name=v1,v2 [rad, m]", "NAME=VALUE", name="--joint",
+          many=True),
+]  # fmt: skip
+OutFolder: TypeAlias = Annotated[
+    Path | None, words(Path, "the path of a folder", "FOLDER", name="--out")
+]
+Formats: TypeAlias = Annotated[
+    Sequence[str],
+    words(formats, "png, pdf, svg, or several with commas", "FORMAT,...", name="--figure-format"),
+]
+Workers: TypeAlias = Annotated[
+    int | str | None,
+    words(workers, f"1 to {MOST_PROCESSES} processes, or a Dask scheduler, tcp://host:port or its "
+          "file", "COUNT|SCHEDULER"),
+]  # fmt: skip
+Overrides: TypeAlias = Annotated[
+    Sequence[str], words(str, "key=value", "KEY=VALUE", name="--set", many=True)
+]
+
+
+def one_of(known: Mapping[str, Any] | Sequence[str]) -> Parameter:
+    """One of some names, as METHODS of a room."""
+    return Parameter(choices=tuple(known))
+
+
+def is_number(value: object) -> bool:
+    """False for a float that is no number or not finite, as nan and inf on a command line."""
+    return not isinstance(value, float) or math.isfinite(value)
