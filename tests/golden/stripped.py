@@ -14,7 +14,7 @@ NOT_RESULTS = {
     r"(^|/)versions(/|$)": "versions of packages",
     r"(^|/)cdpr_drake$": "version and hash of the sources",
     r"(^|/)(commit|code|code_version)$": "state of the sources",
-    r"(^|/)((wall|planning)_time(_s)?|realtime_factor)$": "time that it took",
+    r"(^|/)((wall|planning|sets)_time(_s)?|realtime_factor)$": "time that it took",
     r"(^|/)(seconds|processor_seconds|(kernel_)?microseconds)$": "time that it took",
     r"(^|/)(workers|processors|cores|threads)$": "count of processors",
     r"(^|/)(folder|out|path|results|log_file|host)$": "places on this machine",
