@@ -1,6 +1,7 @@
 """The script of golden files: it sees one changed digit, and what is missing."""
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,11 +11,12 @@ import pytest
 from cdpr_drake.analyses.studies.study import STUDIES
 from tests.golden import __main__ as golden
 from tests.golden import making
+from tests.golden.command_lines import COMMAND_LINES, INPUT_FILES, commands_of
 from tests.golden.comparison import MADE_BY
 from tests.golden.making import Item
 from tests.golden.problems import BATCH, COUNT, problem
 from tests.golden.questions import QUESTIONS, words_of, write_inputs
-from tests.golden.stripped import digest, read_results, strip
+from tests.golden.stripped import digest, read_results, strip, text_lines, without_words
 
 RESULT = {
     "verdict": "feasible",
@@ -168,6 +170,48 @@ def test_questions_on_files_have_their_inputs(tmp_path):
     }  # fmt: skip
     assert named == files
     assert words_of("replay/lengths", tmp_path)[1] == str(tmp_path / "replay.csv")
+
+
+def test_command_lines_have_their_inputs_and_ask_for_json():
+    named = {
+        word for text in COMMAND_LINES.values() for word in text.split() if word in INPUT_FILES
+    }
+    for name, text in INPUT_FILES.items():
+        assert name in named or any(name in other for other in INPUT_FILES.values()), text
+    assert commands_of("commands/robots") == [["robots", "--json"]]
+    assert commands_of("commands/schema-robot") == [["schema", "robot"]]
+    assert [words[0] for words in commands_of("commands/stability-along")] == [
+        "simulate", "stability",
+    ]  # fmt: skip
+
+
+def test_a_command_line_keeps_what_is_printed_and_written_but_no_words_of_a_refusal(
+    tmp_path, monkeypatch
+):
+    """A command that prints, one that refuses in words, one that refuses and prints, a failure."""
+    found = {}
+
+    def run(work, words):
+        (work / "out").mkdir(exist_ok=True)
+        (work / "out" / "a.yaml").write_text("name: mine\n# Check it with `cdpr check a.yaml`.\n")
+        return subprocess.CompletedProcess(words, *found["ends"])
+
+    monkeypatch.setattr(making, "_run", run)
+    found["ends"] = 0, '{"mass_kg": 2.0, "wall_time_s": 3.0}', ""
+    kept = making._command_line(tmp_path, "commands/robots")
+    assert kept["printed"] == {"mass_kg": 2.0}
+    assert kept["texts"] == text_lines(tmp_path / "out") == {"a.yaml": ["name: mine"]}
+    found["ends"] = 2, "", "cdpr: refused"
+    assert making._command_line(tmp_path, "commands/robots") == {"exit code": 2}
+    found["ends"] = 2, '[{"problems": ["this", "that"]}]', ""
+    kept = making._command_line(tmp_path, "commands/check-bad")
+    assert kept == {"exit code": 2, "printed": [{"problems": ["", ""]}]}
+    found["ends"] = 1, "", "Traceback"
+    with pytest.raises(RuntimeError, match="exit code 1: Traceback"):
+        making._command_line(tmp_path, "commands/robots")
+    with pytest.raises(RuntimeError, match="export: exit code 1"):
+        making._command_line(tmp_path, "commands/import-sdf")
+    assert without_words({"a": ["x", None, 1.0]}) == {"a": ["", None, 1.0]}
 
 
 def test_a_refused_scenario_is_a_failure(tmp_path):

@@ -14,14 +14,16 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
+from tests.golden.command_lines import COMMAND_LINES, commands_of, write_input_files
 from tests.golden.comparison import MADE_BY
 from tests.golden.problems import BATCH, COUNT, problem, read_robots, write_files
 from tests.golden.questions import QUESTIONS, words_of
-from tests.golden.stripped import read_results, strip
+from tests.golden.stripped import read_results, strip, text_lines, without_words
 
 ROOT = Path(__file__).parents[2]
 LONGEST_RUN = 10.0
@@ -30,7 +32,10 @@ LONGEST_RUN = 10.0
 RENDERED_RUN = 1.0
 """Simulated time of a scenario with rendered images [s]."""
 
-ACCEPTED_CODES = (0, 2, 6)
+REFUSED = 2
+"""Exit code of a refusal."""
+
+ACCEPTED_CODES = (0, REFUSED, 6)
 """Exit codes of an answer: 2 refuses, 6 tells that measurements contradict the model."""
 
 
@@ -108,7 +113,42 @@ def all_items(inputs: Path) -> list[Item]:
     questions = [
         Item(f"{name}.json", lambda work, n=name: _question(work, n, inputs)) for name in QUESTIONS
     ]
-    return [*batches, *scenarios, *studies, *questions]
+    lines = [Item(f"{name}.json", partial(_command_line, name=name)) for name in COMMAND_LINES]
+    return [*batches, *scenarios, *studies, *questions, *lines]
+
+
+def _command_line(work: Path, name: str) -> dict[str, Any]:
+    """What a command line prints and writes; of a refusal, neither words nor files.
+
+    Raises:
+        RuntimeError: It fails, or a command before it does not make its files.
+    """
+    write_input_files(work)
+    *before, last = commands_of(name)
+    for words in before:
+        done = _run(work, words)
+        if done.returncode:
+            raise RuntimeError(f"{words[0]}: exit code {done.returncode}: {done.stderr[-500:]}")
+    done = _run(work, last)
+    printed = done.stdout if done.stdout.startswith(("{", "[")) else None
+    if done.returncode == REFUSED:
+        answer: dict[str, Any] = {"exit code": REFUSED}
+        if printed is not None:  # the count of problems of each file
+            answer["printed"] = without_words(json.loads(printed))
+        return answer
+    answer = _answer(done.returncode, done.stderr, work / "out")
+    if (work / "out").is_dir():
+        answer["texts"] = text_lines(work / "out")
+    if printed is not None:
+        answer["printed"] = strip(json.loads(printed))
+    return answer
+
+
+def _run(work: Path, words: list[str]) -> subprocess.CompletedProcess[str]:
+    """Ends of `cdpr` in a folder."""
+    return subprocess.run(
+        [_program(), *words], cwd=work, capture_output=True, text=True, check=False, env=_wide()
+    )
 
 
 def _question(work: Path, name: str, inputs: Path) -> dict[str, Any]:

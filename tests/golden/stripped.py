@@ -14,7 +14,7 @@ NOT_RESULTS = {
     r"(^|/)versions(/|$)": "versions of packages",
     r"(^|/)cdpr_drake$": "version and hash of the sources",
     r"(^|/)(commit|code|code_version)$": "state of the sources",
-    r"(^|/)((wall|planning)_time(_s)?|realtime_factor)$": "time that it took",
+    r"(^|/)((wall|planning|sets)_time(_s)?|realtime_factor)$": "time that it took",
     r"(^|/)(seconds|processor_seconds|(kernel_)?microseconds)$": "time that it took",
     r"(^|/)(workers|processors|cores|threads)$": "count of processors",
     r"(^|/)(folder|out|path|results|log_file|host)$": "places on this machine",
@@ -37,6 +37,32 @@ def strip(found: Any, key: str = "") -> Any:
     if isinstance(found, list):
         return [strip(value, f"{key}/{number}") for number, value in enumerate(found)]
     return PLACES.sub("<path>", found) if isinstance(found, str) else found
+
+
+def without_words(found: Any) -> Any:
+    """A result of JSON with all texts empty, where words may change, but not how many."""
+    if isinstance(found, dict):
+        return {name: without_words(value) for name, value in found.items()}
+    if isinstance(found, list):
+        return [without_words(value) for value in found]
+    return "" if isinstance(found, str) else found
+
+
+TEXTS = (".cfg", ".g", ".md", ".py", ".sdf", ".urdf", ".wcrfx", ".xml", ".yaml")
+"""Endings of files for users and other tools, whose lines are kept."""
+
+
+def text_lines(folder: Path) -> dict[str, list[str]]:
+    """Lines of `TEXTS` in a folder by the names of files, but for lines that name a command."""
+    return {
+        file.name: [
+            strip(line)
+            for line in file.read_text(encoding="utf-8").splitlines()
+            if "cdpr " not in line
+        ]
+        for file in sorted(folder.iterdir())
+        if file.suffix in TEXTS
+    }
 
 
 def digest(array: Any) -> dict[str, Any]:
