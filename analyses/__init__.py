@@ -1,1 +1,1 @@
-"""Runs, studies and benchmarks: each returns a result object and knows its table and figures."""
+"""Runs and studies: each returns a result object and knows its table and figures."""

@@ -23,7 +23,7 @@ interaction matrices.
 
 Packages of pure functions take arrays, small dataclasses and RigidTransforms, never a robot file;
 `cdpr_drake.models` turns files into those, `cdpr_drake.systems` holds the Drake blocks,
-`cdpr_drake.analyses` the runs, studies and benchmarks.
+`cdpr_drake.analyses` the runs and studies.
 
 Compiled kernels are cached in the user's cache folder, or where NUMBA_CACHE_DIR says.
 """

@@ -34,7 +34,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import cdpr_drake
-from cdpr_drake.analyses.benchmarks.groups import BENCH_GROUPS
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies.study import STUDIES, Study
 from cdpr_drake.analyses.workspaces import stability_figures
@@ -68,8 +67,6 @@ def lighten() -> None:
     empty = {name: Study(name=name, title="", cases=lambda form: ()) for name in STUDIES}
     sys.modules["cdpr_drake.analyses.studies.empty"] = SimpleNamespace(STUDIES=empty)
     STUDIES.update(dict.fromkeys(STUDIES, "empty"))
-    for name in BENCH_GROUPS:
-        BENCH_GROUPS[name] = lambda quick: []
     for module, name in (*PICTURES, (view, "time"), (doctor, "examine")):
         assert hasattr(module, name), f"{module.__name__} has no {name} to replace any more"
     doctor.examine = list

@@ -113,7 +113,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "notebooks": ("Tools", "cdpr notebooks", "cdpr notebooks my_notebooks"),
     "examples": ("Tools", "cdpr examples", "cdpr examples own_controller --out here"),
     "doctor": ("Tools", "cdpr doctor", "cdpr doctor --compile"),
-    "bench": ("Tools", "cdpr bench", "cdpr bench tension"),
 }
 """Subcommands in the order of the help: group, and two lines to try or to change."""
 

@@ -180,13 +180,6 @@ def test_steps_of_compilation_are_all_scenarios_and_both_engines_of_the_default(
     dict(compilation_steps())["acrobot_pbvs"]()
 
 
-def test_bench(capsys, monkeypatch):
-    names = [row["name"] for row in told(capsys, "bench", "tension", "--quick")["tension"]]
-    assert "exact QP, one call" in names
-    monkeypatch.setattr("cdpr_drake.cli.bench.BENCH_GROUPS", {})  # as in a wheel
-    assert "source checkout" in refuse(capsys, "bench", "tension")
-
-
 def test_options_of_imported_logs_that_change_nothing_are_told(capsys, here):
     log = "time_s,C1_length_m\n0,1\n0.1,1.1\n0.2,1.2\n"
     (here / "log.csv").write_text(log)

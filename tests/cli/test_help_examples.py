@@ -49,7 +49,6 @@ LONG_WORK = {
     "study": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "reproduce": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "doctor": ["cdpr_drake.cli.doctor.examine", "cdpr_drake.cli.doctor.run_jobs"],
-    "bench": ["cdpr_drake.cli.bench.BENCH_GROUPS"],
 }
 """Where the long work of a command begins: all its arguments are read and accepted there."""
 
@@ -60,14 +59,6 @@ class Accepted(BaseException):
 
 def begin(*_, **__):
     raise Accepted
-
-
-class AcceptedGroups(dict):
-    """Groups of benchmarks, none of which runs."""
-
-    def __getitem__(self, name):
-        assert name in self
-        return begin
 
 
 def lengths_log(robot):
@@ -150,12 +141,7 @@ def test_an_example_is_accepted(line, capsys, here, monkeypatch):
         for path in (sorted(Path().glob(word)) if "*" in word else [word])
     ]
     for target in LONG_WORK.get(command, ()):
-        if target.endswith("BENCH_GROUPS"):
-            import cdpr_drake.cli.bench as bench
-
-            monkeypatch.setattr(bench, "BENCH_GROUPS", AcceptedGroups(bench.BENCH_GROUPS))
-        else:
-            monkeypatch.setattr(target, begin)
+        monkeypatch.setattr(target, begin)
     found = ended([command, *arguments])
     said = printed(capsys).err
     assert found == ("accepted" if command in LONG_WORK else 0), said

@@ -14,7 +14,6 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver
 from pydrake.symbolic import Expression
 from pydrake.systems.primitives import LinearSystem
 
-from cdpr_drake.analyses.benchmarks import constraints as benchmark
 from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
 from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
@@ -46,6 +45,7 @@ from cdpr_drake.stability.desired_view import FixedObject
 from cdpr_drake.stability.perturbation_bounds import BASELINE
 from cdpr_drake.stability.stability_case import StabilityCase
 from cdpr_drake.stability.verdict import judge_stability
+from tests.benchmarks import autodiff
 from tests.planning.planning_cases import (
     MARK,
     damped_acrobot,
@@ -138,10 +138,10 @@ def test_jacobians_are_those_of_differences(kind, pulleys):
             check_slopes(constraint, numbers(constraint, order, seed))
 
 
-@pytest.mark.parametrize("name", benchmark.pairs())
+@pytest.mark.parametrize("name", autodiff.pairs())
 def test_kernels_are_the_automatic_derivatives_of_the_same_source(name):
-    constraint, automatic = benchmark.pairs()[name]
-    x = InitializeAutoDiff(benchmark.numbers(constraint)).ravel()
+    constraint, automatic = autodiff.pairs()[name]
+    x = InitializeAutoDiff(autodiff.numbers(constraint)).ravel()
     ours, theirs = constraint.as_drake().Eval(x), automatic(x)
     np.testing.assert_allclose(ExtractValue(ours), ExtractValue(theirs), atol=ROUNDING)
     expected = ExtractGradient(theirs)

@@ -14,7 +14,13 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog, minimize
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_path_task import make_path, path_task, robot_limits
+from cdpr_drake.analyses.planning.robot_path_task import (
+    RESERVE,
+    LimitSettings,
+    make_path,
+    path_task,
+    robot_limits,
+)
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -26,6 +32,7 @@ from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.planning.path_timing_program import PathTimingProgram, task_asks
 from cdpr_drake.planning.resistance import resistance_bounds, resisted, resisted_along, row_count
 from cdpr_drake.trajectories.pose_path import POINT_SIZE
+from tests.benchmarks.highs import station_programs
 from tests.planning.convex_timing import convex_time, difference_asks
 from tests.planning.planning_cases import BETWEEN, PATHS, case, limits, planned, pose, wrench_of
 
@@ -49,6 +56,18 @@ def test_the_time_is_that_of_a_convex_program(name, count):
     plan = planned(name)
     reference = convex_time(load_robot(name), plan.task, plan.path, count)
     np.testing.assert_allclose(plan.duration, reference, rtol=AGREEMENT)
+
+
+def test_without_limits_of_speed_the_largest_speed_of_a_station_is_that_of_highs():
+    robot = load_robot("acrobot_large")
+    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), cable_speed=1e3, reserve=RESERVE))
+    path = make_path(
+        robot, [pose(0.0, 0.0, 0.2), pose(0.15, -0.1, 0.4), pose(-0.1, 0.1, 0.3)], "smooth"
+    )
+    plan, some = plan_along_path(task, path, 20), slice(4, -4, 4)
+    programs = station_programs(task, path, plan.trajectory.stations[some])
+    largest = [linprog(**program).x[1] for program in programs]
+    np.testing.assert_allclose(np.minimum(plan.largest[some], 100.0), largest, rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", PATHS)

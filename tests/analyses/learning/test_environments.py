@@ -15,13 +15,11 @@ from gymnasium.utils.env_checker import check_env
 
 import cdpr_drake as cdpr
 import cdpr_drake.gym
-from cdpr_drake.analyses.benchmarks.learning import learning_rows
 from cdpr_drake.analyses.learning.task_table import TASKS, make_task
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.analyses.benchmarks.once import without_repeats
 from tests.messages import printed
 
 NAMES = [f"cdpr/{name}-v0" for name in TASKS]
@@ -264,9 +262,3 @@ def test_bad_input_is_told_in_one_line(capsys, tmp_path, monkeypatch, words, tol
     assert told in err
     assert len(err.splitlines()) == 1
     assert not list(tmp_path.iterdir())
-
-
-def test_benchmarks_compare_every_task(monkeypatch):
-    without_repeats(monkeypatch)
-    rows = learning_rows(quick=True)
-    assert [row.as_dict()["name"].split(",")[0] for row in rows] == cdpr.environment_names()

@@ -1,9 +1,11 @@
 """The recipe of the stability tables: what variants change, rows it meets, rows in sight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.benchmarks.stability import plain_pairs
 from cdpr_drake.analyses.studies.recipe_variants import (
     EXCHANGE,
     IN_USE,
@@ -20,8 +22,12 @@ from cdpr_drake.analyses.studies.stability_recipe import (
 )
 from cdpr_drake.analyses.studies.stability_tables import BY_NAME
 from cdpr_drake.errors import StabilityError
+from cdpr_drake.geometry.poses import cross_matrix, rotation_from_vector
+from cdpr_drake.servoing.pose_features import theta_u_interaction
+from cdpr_drake.stability.criterion import ModelAtPose, stability_matrix
 from cdpr_drake.stability.desired_view import OppositeCorner
 from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
+from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
 from cdpr_drake.stability.verdict import VerdictOptions, judge_stability
 from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
@@ -137,9 +143,31 @@ def test_negative_bounds_are_refused():
         single_bounds(PerturbationBounds(), "r_A", -1.0)
 
 
+def stable_in_numpy(case, bounds, pose, draws):
+    """The sampled verdict at one pose, as one writes it down."""
+    X_WP, m, cables = RigidTransform(pose[4:]), case.m, case.cables
+    R_PC, p_PC = case.X_PC.rotation(), case.X_PC.translation()
+    target = case.target.rows(R_PC.matrix()[np.newaxis], (pose[4:] + p_PC)[np.newaxis])
+    L = np.zeros((6, 6))
+    L[:3, :3], L[3:, 3:] = theta_u_interaction(target.theta_u[0]), -np.eye(3)
+    L[3:, :3] = cross_matrix(target.error[0])
+    truth, least = ModelAtPose(X_WP, cables, case.X_PC, L), []
+    for d in draw_perturbations(pose, bounds, m, draws):
+        points = d[18:].reshape(2, m, 3).transpose(0, 2, 1)
+        estimate = ModelAtPose(
+            RigidTransform(X_WP.rotation() @ rotation_from_vector(d[:3]), pose[4:] + d[3:6]),
+            replace(cables, p_WA=cables.p_WA + points[0], p_PB=cables.p_PB + points[1]),
+            RigidTransform(R_PC @ rotation_from_vector(d[6:9]), p_PC + d[9:12]),
+            L,
+        )
+        Pi = stability_matrix(truth, estimate)
+        least.append(np.min(np.linalg.eigvalsh(Pi + Pi.T)))
+    return min(least) > 0.0
+
+
 def test_plain_loop_agrees_with_the_kernel():
     case = recipe_case("acrobot_large", "pbvs")
     poses = recipe_grid("acrobot_large", quick=True).pose_rows()[::7]
     found = judge_stability(case, BASELINE, poses, options=VerdictOptions(draws=5)).stable
-    assert [plain_pairs(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
+    assert [stable_in_numpy(case, BASELINE, pose, 5) for pose in poses] == found.tolist()
     assert 0 < np.sum(found) < len(poses)

@@ -10,7 +10,6 @@ import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.benchmarks.batches import TendonRollout
 from cdpr_drake.analyses.front.environments import environment_names, make_environment
 from cdpr_drake.errors import CdprError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_row
@@ -22,6 +21,7 @@ from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.failures import Failure, FailureSettings
 from cdpr_drake.systems.robots.settings import CableRobotSettings
+from tests.benchmarks.mujoco import TendonRollout
 from tests.systems.batches.batch_cases import (
     DAMPED,
     ELASTIC,

@@ -10,14 +10,18 @@ from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import adjoint, exponential, pose_from_angles
+from cdpr_drake.geometry.straight_cables import length_jacobian
+from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.pose_features import pose_feature_error, pose_interaction
 from cdpr_drake.servoing.servo_law import AdaptiveGain, ServoLaw
 from cdpr_drake.servoing.servo_task import BelievedRobot, make_task
 from cdpr_drake.servoing.visual_features import ObjectPoseFeatures, sighting
-from cdpr_drake.systems.controllers.feature_servo import FeatureServo
+from cdpr_drake.systems.controllers.feature_servo import FeatureServo, control_step
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
+from cdpr_drake.systems.diagrams.beliefs import believed_robot
+from cdpr_drake.systems.diagrams.controller import make_controller
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.vision.apriltags import TagTarget
@@ -196,6 +200,43 @@ def test_updates_follow_the_formula_of_the_continuous_start():
         expected = -GAIN(e) * (wanted - at_start * np.exp(-SIGMA * number * PERIOD))
         np.testing.assert_allclose(found["platform_velocity"], expected, atol=ROUND_OFF)
         seen = sight_after(expected, PERIOD, seen, MODEL.X_PC)
+
+
+def ibvs_in_numpy(scenario, target, pinhole, X_CO, marks):
+    """Cable velocities of IBVS by four corners, without a continuous start [m/s]."""
+    robot, c = load_robot(scenario.robot), scenario.controller
+    cables, X_WP = robot.cable_set().without_pulleys(), scenario.initial_pose.transform()
+    uv = marks.reshape(-1, 2).T
+    points = np.array([(uv[0] - pinhole.cx) / pinhole.fx, (uv[1] - pinhole.cy) / pinhole.fy])
+    rows = []
+    for (x, y), Z in zip(points.T, (X_CO @ target.points)[2], strict=True):
+        rows.append([x * y, -(1 + x * x), y, -1 / Z, 0.0, x / Z])
+        rows.append([1 + y * y, -x * y, -x, 0.0, -1 / Z, y / Z])
+    error = (points - target.ideal_marks(scenario.desired.transform())).T.ravel()
+    gain = AdaptiveGain(c.lambda_0, c.lambda_infinity, c.lambda_slope)(error)
+    V_P = adjoint(robot.camera_mount("onboard").pose.transform()) @ (
+        -gain * np.linalg.pinv(np.array(rows)) @ error
+    )
+    R = X_WP.rotation().matrix()
+    V_WP = np.concatenate([R @ V_P[:3], R @ V_P[3:]])
+    rates = length_jacobian(X_WP, cables.p_WA, cables.p_PB) @ V_WP
+    return rates * min(1.0, robot.winch.rated_cable_speed() / np.max(np.abs(rates)))
+
+
+def test_a_step_of_ibvs_is_that_of_plain_numpy():
+    scenario = load_scenario("acrobot_ibvs", ["controller.sigma=null"])
+    robot, X_WP = load_robot(scenario.robot), scenario.initial_pose.transform()
+    mount, target = robot.camera_mount("onboard"), scenario.target.target()
+    pinhole = load_camera(mount.model).pinhole(640, 480)
+    X_CO = (X_WP @ mount.pose.transform()).inverse() @ scenario.target.path().at(0.0)
+    marks = target.project(X_CO, pinhole, 0.0, np.random.default_rng(0))
+    controller = make_controller(scenario, believed_robot(scenario, robot), target, pinhole)
+    command, _ = control_step(
+        controller, controller.fresh_memory(), (target, pinhole), (X_CO, marks), X_WP, 0.5
+    )
+    expected = ibvs_in_numpy(scenario, target, pinhole, X_CO, marks)
+    assert np.max(np.abs(expected)) > 1e-2
+    np.testing.assert_allclose(command.cable_velocities, expected, rtol=0.0, atol=1e-10)
 
 
 def test_a_servo_starts_from_rest_and_gains_speed():

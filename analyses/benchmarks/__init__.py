@@ -1,1 +1,0 @@
-"""Timings as ratios within one run, one group a file; `BENCH_GROUPS` is their table."""
