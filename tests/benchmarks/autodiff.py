@@ -79,7 +79,7 @@ def constraint_ways(
     empty = of_pydrake(lambda z: np.repeat(z[:1], r))
     return {
         name: per_call(partial(constraint.as_drake().Eval, variables), 20 * CALLS),
-        f"  values and Jacobian of {r} rows": per_call(
+        "  values and Jacobian alone": per_call(
             partial(constraint.evaluate, x[np.newaxis]), 20 * CALLS
         ),
         "  an empty constraint of pydrake": per_call(empty, 20 * CALLS),

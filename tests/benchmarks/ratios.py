@@ -39,7 +39,7 @@ class Ratio:
             f"{faster:.3g} times as fast" if faster >= 1.0 else f"{1 / faster:.3g} times as long"
         )
         return (
-            f"{self.name:48} {_time(self.seconds):>10}   {words} as {self.baseline} "
+            f"{self.name:54} {_time(self.seconds):>8}   {words} as {self.baseline} "
             f"({_time(self.baseline_seconds)})"
         )
 
