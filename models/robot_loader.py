@@ -168,8 +168,10 @@ def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
     return robot
 
 
-def names_mechanism(name: str | Path) -> bool:
-    """Whether a name or path is that of a mechanism; also False where there is no such file."""
+def names_mechanism(name: Robot | Mechanism | str | Path) -> bool:
+    """Whether this is a mechanism, or its name or path; also False where there is no such file."""
+    if not isinstance(name, str | Path):
+        return isinstance(name, Mechanism)
     try:
         return is_mechanism(robot_file(str(name)))
     except RobotFileError:

@@ -115,9 +115,7 @@ class _Call:
         @app.meta.default
         def meta(
             *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-            json: Annotated[
-                bool, Parameter(negative=(), group=SHARED, show_default=False)
-            ] = False,
+            json: Annotated[bool, Parameter(negative=(), group=SHARED, show_default=False)] = False,
             plot: Annotated[
                 list[str] | None, Parameter(metavar="[FIGURE=]FILE", group=SHARED, n_tokens=1)
             ] = None,

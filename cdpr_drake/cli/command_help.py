@@ -43,21 +43,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr export caroca --format sdf --out here",
     ),
     "schema": ("Robots and scenarios", "cdpr schema robot", "cdpr schema scenario"),
-    "tension": (
-        "Analyse",
-        "cdpr tension acrobot_large",
-        "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all",
-    ),
-    "static": (
-        "Analyse",
-        "cdpr static acrobot_large",
-        "cdpr static caroca --pose 0,0,1.5 --cable-model catenary",
-    ),
-    "equilibria": (
-        "Analyse",
-        "cdpr equilibria grab_three --position 0.6,1.16,-1.5",
-        "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3",
-    ),
     "workspace": (
         "Analyse",
         "cdpr workspace acrobot_large",

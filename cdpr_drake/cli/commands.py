@@ -39,6 +39,18 @@ COMMANDS = {
         ("cdpr tension acrobot_large",
          "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all"),
     ),
+    "static": Command(
+        "Analyse", f"{_VERBS}.statics.static:solve_static",
+        "Computes lengths, tensions, stiffness, vibrations and sag of a robot at rest.",
+        ("cdpr static acrobot_large",
+         "cdpr static caroca --pose 0,0,1.5 --cable-model catenary"),
+    ),
+    "equilibria": Command(
+        "Analyse", f"{_VERBS}.equilibria:find_equilibria",
+        "Finds all poses of rest, stable or not, with any cables slack, for lengths or a position.",
+        ("cdpr equilibria grab_three --position 0.6,1.16,-1.5",
+         "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3"),
+    ),
     "notebooks": Command(
         "Tools", f"{_VERBS}.front.scenarios:load_scenario", "Lists notebooks, or copies them.",
         ("cdpr notebooks", "cdpr notebooks my_notebooks"),

@@ -9,7 +9,7 @@ import yaml
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
-from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
 from cdpr_drake.cli.app import main
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import CableModelError
@@ -81,7 +81,7 @@ def test_the_command_says_so(tmp_path, capsys):
     path.write_text(yaml.safe_dump(content("hanging_four", platform=platform)))
     drawn = tmp_path / "does.png"
     lengths = ",".join(map(str, lengths_at_home(small_robot("hanging_four"))))
-    for more, code in ((["--plot-behaviour", str(drawn)], 0), (["--json"], 0)):
+    for more, code in ((["--plot", f"behaviour={drawn}"], 0), (["--json"], 0)):
         with pytest.raises(SystemExit) as stop:
             main(["static", str(path), "--lengths", lengths, *more])
         assert stop.value.code == code
@@ -94,7 +94,7 @@ def test_the_command_says_so(tmp_path, capsys):
             assert "rest is not unique: contacts hold moments up to (0.006, 0.006, 0.01) N m" in out
     assert drawn.stat().st_size > 5000
     with pytest.raises(SystemExit) as stop:
-        main(["static", "acrobot_small", "--plot-behaviour", str(tmp_path / "none.png")])
+        main(["static", "acrobot_small", "--plot", f"behaviour={tmp_path / 'none.png'}"])
     assert stop.value.code == 2
     assert "accepted: cable.behaviour or platform.hysteresis" in " ".join(
         printed(capsys).err.split()
@@ -105,13 +105,13 @@ def test_the_command_says_so(tmp_path, capsys):
 def test_the_picture_has_what_the_file_has():
     robot = cdpr.load_robot("irma4u")
     with pytest.raises(CableModelError, match="elastic cables alone"):
-        cdpr.solve_static(robot).plot_behaviour(robot)
+        cdpr.solve_static(robot).plot("behaviour")
     behaviour = BehaviourSettings(
         stiffening=5e-3, sheave_friction=0.05, creep_stiffness=0.3, creep_time=0.3
     )
     robot = rubbing(replace(robot, cable=replace(robot.cable, behaviour=behaviour)))
     report = cdpr.solve_static(robot)
-    figure = report.plot_behaviour(robot)
+    figure = report.plot("behaviour")
     assert figure_faults(figure) == []
     cables, drums, contacts = figure.axes
     assert figure.get_figwidth() < WIDEST
