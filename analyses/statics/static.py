@@ -183,7 +183,7 @@ def solve_static(
                 free=free, yields=yields,
             )  # fmt: skip
         return _mechanism_at_rest(
-            robot, lengths, joints, model or ELASTIC, pulleys, yields or YIELDS[0], prestress,
+            robot, lengths, dict(joints or {}), model or ELASTIC, pulleys, yields or YIELDS[0], prestress,
             free, held, limits,
         )  # fmt: skip
     refuse_arguments(
@@ -203,14 +203,14 @@ def solve_static(
 
 
 def _mechanism_at_rest(
-    robot: Any, lengths: Any, joints: Mapping[str, Any] | None, model: str, pulleys: bool,
+    robot: Any, lengths: Any, joints: Mapping[str, Any], model: str, pulleys: bool,
     yields: str, prestress: Any, free: Sequence[str] | None, held: Sequence[str] | None,
     limits: tuple[float, float] | None,
 ) -> MechanismAtRest:  # fmt: skip
     from cdpr_drake.analyses.mechanisms import joint_names, place_mechanism
     from cdpr_drake.models.plant_rest import hang, settle
 
-    placed = place_mechanism(robot, dict(joints or {}), model=model, pulleys=pulleys)
+    placed = place_mechanism(robot, joints, model=model, pulleys=pulleys)
     cables, context = placed.cables, placed.context
     if lengths is None:
         low, high = placed.mechanism.tension_limits(limits)

@@ -53,8 +53,8 @@ class PoseSolver:
             found["why_no_tensions"] = str(problem)
         rest, why_no_rest = None, ""
         try:
-            rest = solve_static(robot, X_WP)
-            assert isinstance(rest, RobotAtRest)
+            at_rest = solve_static(robot, X_WP)
+            rest = at_rest if isinstance(at_rest, RobotAtRest) else None
         except CdprError as problem:
             why_no_rest = str(problem)
         try:
