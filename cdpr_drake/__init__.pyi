@@ -1,11 +1,11 @@
+from .analyses.environments import environment_names as environment_names
+from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
 from .analyses.front.design import optimize_design as optimize_design
-from .analyses.front.environments import environment_names as environment_names
-from .analyses.front.environments import make_environment as make_environment
 from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.failures import compare_reactions as compare_reactions
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
@@ -37,6 +37,7 @@ from .analyses.studies.study import run_study as run_study
 from .analyses.studies.study import studies as studies
 from .analyses.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.tensions import solve_tensions as solve_tensions
+from .analyses.view import view as view
 from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError

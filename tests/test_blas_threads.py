@@ -21,7 +21,7 @@ NO_CALLS = ("Session", "TENSION_METHODS", "environment_names", "make_environment
 """Public names of the front that compute nothing themselves."""
 
 FRONT = Path(cdpr.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-MODULES = r"analyses\.(?:front\.\w+|statics\.static|tensions|kinematics|equilibria)"
+MODULES = r"analyses\.(?:front\.\w+|statics\.static|tensions|view|kinematics|equilibria)"
 VERBS = [name for name in re.findall(MODULES + r" import (\w+)", FRONT) if name not in NO_CALLS]
 
 

@@ -37,7 +37,7 @@ class Result(ABC):
     """An answer. It shows itself alike on a terminal, in a notebook and at Python's prompt."""
 
     @abstractmethod
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any] | list[Any]:
         """All numbers, for JSON; keys end in units."""
 
     @abstractmethod

@@ -183,8 +183,8 @@ def solve_static(
                 free=free, yields=yields,
             )  # fmt: skip
         return _mechanism_at_rest(
-            robot, lengths, dict(joints or {}), model or ELASTIC, pulleys, yields or YIELDS[0], prestress,
-            free, held, limits,
+            robot, lengths, dict(joints or {}), model or ELASTIC, pulleys, yields or YIELDS[0],
+            prestress, free, held, limits,
         )  # fmt: skip
     refuse_arguments(
         OF_MECHANISMS, joints=joints, yields=yields, prestress=prestress, free=free,

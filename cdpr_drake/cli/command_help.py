@@ -9,11 +9,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr simulate caroca_ibvs --camera projected --seeds 0:20",
     ),
     "serve": ("Run", "cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
-    "environments": (
-        "Run",
-        "cdpr environments",
-        "cdpr environments Reach --robot acrobot_small --picture reach.png",
-    ),
     "robots": ("Robots and scenarios", "cdpr robots", "cdpr robots --json"),
     "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
     "new": (
@@ -26,7 +21,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr check mine.yaml",
         "cdpr check robot.yaml scenario.yaml",
     ),
-    "view": ("Robots and scenarios", "cdpr view acrobot_large", "cdpr view two_platforms"),
     "studio": (
         "Robots and scenarios",
         "cdpr studio acrobot_large",

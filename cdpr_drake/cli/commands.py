@@ -33,6 +33,17 @@ FIRST_STEPS = {
 _VERBS = "cdpr_drake.analyses"
 
 COMMANDS = {
+    "environments": Command(
+        "Run", f"{_VERBS}.environments:list_environments",
+        "Lists the Gymnasium environments, with the sizes of action and observation for a robot.",
+        ("cdpr environments",
+         "cdpr environments Reach --robot acrobot_small --picture reach.png"),
+    ),
+    "view": Command(
+        "Robots and scenarios", f"{_VERBS}.view:view",
+        "Shows a robot or a mechanism at its home, held by its cables, in Meshcat.",
+        ("cdpr view acrobot_large", "cdpr view two_platforms"),
+    ),
     "tension": Command(
         "Analyse", f"{_VERBS}.tensions:solve_tensions",
         "Finds cable tensions that hold the platform at a pose, or proves that there are none.",
