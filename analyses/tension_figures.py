@@ -25,8 +25,8 @@ def polygon_figure(
     """The feasible polygon in the null space with a point for each solution.
 
     Args:
-        problem: What was asked.
-        solutions: Its solutions; those without tensions are left out.
+        problem: The problem.
+        solutions: Its solutions; solutions without tensions are left out.
         title: Title.
 
     Raises:
@@ -44,13 +44,13 @@ def polygon_figure(
     axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
     solutions = [s for s in solutions if np.all(np.isfinite(s.tensions))]
     extent = float(np.max(np.ptp(vertices, axis=1)))
-    free = list(MARKERS)
+    markers = list(MARKERS)
     for eta, labels, filled in _places(solutions, N, extent):
-        # A method keeps its look in all polygons; where several meet, it is that of the first. In
-        # grey print two of more methods than symbols would be one.
+        # A method keeps its look in all polygons; where several meet, the first one's look holds.
+        # With more methods than markers some would look alike in grey print.
         look = look_of(labels[0].partition(" ")[0], list(METHODS))
-        marker = look.marker if look.marker in free or not free else free[0]
-        free = [one for one in free if one != marker]
+        marker = look.marker if look.marker in markers or not markers else markers[0]
+        markers = [other for other in markers if other != marker]
         axes.plot(
             *eta,
             marker,
@@ -64,8 +64,11 @@ def polygon_figure(
     room = 0.12 * max(float(np.max(high - low)), 1e-9)
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     _draw_bounds(axes, problem, t, N)
-    axes.set(xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]", aspect="equal")
-    axes.legend(loc="center left", bbox_to_anchor=(1.26, 0.5))
+    axes.set(
+        xlabel=r"$\eta_1$ [N], of tensions $t = t_0 + N \eta$ with $W N = 0$",
+        ylabel=r"$\eta_2$ [N]", aspect="equal",
+    )  # fmt: skip
+    figure.legend(loc="outside center right")  # one of the axes would be cut at their aspect
     return figure
 
 
@@ -88,9 +91,9 @@ def _places(
 
 
 def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None:
-    """The lines on which one tension is at a bound; where they leave, whose and which bound.
+    """Draws the lines on which a tension is at a bound, with the cable and the bound at their ends.
 
-    Words stand outside at the right and at the top, those of lines that leave together as one.
+    The words stand at the right and at the top; lines that leave together share theirs.
     """
     ends: dict[int, list[Leaving]] = {0: [], 1: []}
     for bounds, style in ((problem.lower, "-"), (problem.upper, "--")):
@@ -102,16 +105,17 @@ def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None
             right = abs(N[i, 1]) > abs(N[i, 0])  # it runs more along x than along y
             last = line[np.argmax(line[:, 0 if right else 1])]
             ends[0 if right else 1].append((float(last[1 if right else 0]), i + 1, float(bound)))
-    for across, found in ends.items():
+    for across, leaving in ends.items():
         low, high = axes.get_ylim() if across == 0 else axes.get_xlim()
-        for group in _near(sorted(found), (0.06, 0.24)[across] * (high - low)):
+        for group in _near(sorted(leaving), (0.06, 0.24)[across] * (high - low)):
             middle = (group[0][0] + group[-1][0]) / 2.0
             named: dict[float, list[int]] = {}
             for _, number, bound in group:
                 named.setdefault(bound, []).append(number)
             words = "\n".join(
-                f"cable{'s' * (len(some) > 1)} {', '.join(map(str, sorted(some)))} at {bound:g} N"
-                for bound, some in named.items()
+                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, sorted(numbers)))} at "
+                f"{bound:g} N"
+                for bound, numbers in named.items()
             )
             place = (1.01, (middle - low) / (high - low))
             axes.text(

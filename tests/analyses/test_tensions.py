@@ -95,8 +95,8 @@ def test_fewer_cables_than_degrees_of_freedom(capsys):
     one_line(lambda: cdpr.solve_tensions(robot, method="dykstra"), "quadratic_program")
 
 
-def methods_in(axes):
-    words = " ".join(text.get_text() for text in axes.get_legend().get_texts()).split()
+def methods_in(figure):
+    words = " ".join(text.get_text() for text in figure.legends[0].get_texts()).split()
     return sorted(word for word in words if word in METHODS)
 
 
@@ -109,7 +109,7 @@ def test_the_polygon_names_every_method_that_was_asked_for_once(monkeypatch, met
     assert figure_faults(figure) == []
     (axes,) = figure.axes
     assert compiled == []
-    assert methods_in(axes) == sorted(solution.method for solution in result.solutions)
+    assert methods_in(figure) == sorted(solution.method for solution in result.solutions)
     markers = [line.get_marker() for line in axes.lines if line.get_linestyle() == "None"]
     assert len(set(markers)) == len(markers)  # grey print has no colours
     assert "[N]" in axes.get_xlabel()
