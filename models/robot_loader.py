@@ -101,6 +101,8 @@ def robot_file(name: str) -> Path:
         file = path.suffix or "/" in name
         hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
         known = "cdpr robots lists the names" if file else closest(name, robot_names())
+        if not file and input_there(Path(f"{name}.yaml")):
+            known = f"did you mean {name}.yaml?"
         raise RobotFileError(f"robot {name!r} is unknown; {known}{hint}")
     return _FOLDER / name / "robot.yaml"
 

@@ -145,6 +145,7 @@ REFUSED = {
         ("cable_arm --wrench 0,0,0,0,0,1", "--wrench: found with a mechanism"),
         ("planar --joint a=1 --pose 0,0,0", "--joint: found with a robot"),
         ("nowhere.yaml", "nowhere.yaml"),
+        ("mine", "did you mean mine.yaml?"),
         ("cable_arm --method none", "--method: found 'none'"),
     ],
     "static": [
