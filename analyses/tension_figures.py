@@ -68,7 +68,7 @@ def polygon_figure(
         xlabel=r"$\eta_1$ [N], of tensions $t = t_0 + N \eta$ with $W N = 0$",
         ylabel=r"$\eta_2$ [N]", aspect="equal",
     )  # fmt: skip
-    figure.legend(loc="outside center right")  # one of the axes would be cut at their aspect
+    figure.legend(loc="outside right center")  # one of the axes would be cut at their aspect
     return figure
 
 

@@ -38,13 +38,13 @@ from cdpr_drake.tensions.methods import (
     solution_space,
 )
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
-from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdpr_drake.models.mechanism_schema import Mechanism
     from cdpr_drake.statics.controlled_wrenches import WrenchControl
+    from cdpr_drake.tensions.shortfall import Shortfall
 
 TENSION_METHODS: Mapping[str, TensionMethod] = METHODS
 """Methods of `solve_tensions` and `distribute` by name; a new one is a row of
@@ -118,7 +118,11 @@ class Tensions(Result):
         if self.control is not None:
             return self.control.shortfall()
         none = any(each.status == TensionStatus.INFEASIBLE for each in self.solutions)
-        return shortfall(self.problem) if none and self.problem is not None else None
+        if self.problem is None or not none:
+            return None
+        from cdpr_drake.tensions.shortfall import shortfall
+
+        return shortfall(self.problem)
 
     def uncontrolled(self) -> list[dict[str, Any]]:
         """For each twist that changes no length: the combination of the wrench that no tensions

@@ -22,7 +22,6 @@ from cdpr_drake.cables.models import CABLE_MODELS, check_model
 from cdpr_drake.errors import CableModelError, Problems, RobotFileError, why_not_read
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
 from cdpr_drake.models.exit_points import MARK, check_rail, split_name
 from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.materials import check_materials
@@ -346,6 +345,8 @@ def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None
 
 def _check_cameras(robot: Robot, path: Path, problems: Problems) -> None:
     """Refuses cameras of the same name, of no catalogue, or of a wrong file; resolves the files."""
+    from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
+
     mounts = [mount.name for mount in robot.cameras]
     for index, mount in enumerate(robot.cameras):
         place, named = f"{path}: cameras[{index}]", mount.name
