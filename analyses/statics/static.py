@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -166,7 +166,7 @@ def solve_static(
             cables nor motors act.
         held: Of a mechanism: joints that motors hold; default: those with actuators.
         limits: Of a mechanism: smallest and largest tension [N]; default: its own. A smallest one
-            of 0 asks for `plant_rest.LEAST_SHARE` of the weight a cable, where that is possible.
+            of 0 asks for 1 % of the weight per cable, where that is possible.
 
     Raises:
         EquilibriumError: Pose and lengths, lengths and what chooses tensions, a model, joint or
@@ -182,10 +182,23 @@ def solve_static(
                 "found with lengths; accepted: without", prestress=prestress, limits=limits,
                 free=free, yields=yields,
             )  # fmt: skip
-        return _mechanism_at_rest(
-            robot, lengths, dict(joints or {}), model or ELASTIC, pulleys, yields or YIELDS[0],
-            prestress, free, held, limits,
-        )  # fmt: skip
+        from cdpr_drake.analyses.mechanisms import joint_names, place_mechanism
+        from cdpr_drake.models.plant_rest import hang, settle
+
+        placed = place_mechanism(robot, dict(joints or {}), model=model or ELASTIC, pulleys=pulleys)
+        cables, context, motors = placed.cables, placed.context, joint_names(held)
+        if lengths is None:
+            low, high = placed.mechanism.tension_limits(limits)
+            rest = hang(
+                cables, context, yields=yields or YIELDS[0], free=joint_names(free), held=motors,
+                prestress=None if prestress is None else np.squeeze(np.asarray(prestress, float)),
+                lower=low if low > 0.0 else None, upper=high,
+            )  # fmt: skip
+        else:
+            l0 = checked_lengths(lengths, cables.routes.count, placed.mechanism.name)
+            rest = settle(cables, context, l0, held=motors)
+        cables.plant.SetPositions(context, rest.positions)
+        return MechanismAtRest(placed, rest, cables.outputs(context, rest.unstrained_lengths)[2])
     refuse_arguments(
         OF_MECHANISMS, joints=joints, yields=yields, prestress=prestress, free=free,
         held=held, limits=limits,
@@ -200,27 +213,3 @@ def solve_static(
         return static_at_pose(loaded, as_pose(loaded, pose), model, pulleys)
     l0 = checked_lengths(lengths, len(loaded.cables), loaded.name)
     return static_at_lengths(loaded, l0, model, pulleys)
-
-
-def _mechanism_at_rest(
-    robot: Any, lengths: Any, joints: Mapping[str, Any], model: str, pulleys: bool,
-    yields: str, prestress: Any, free: Sequence[str] | None, held: Sequence[str] | None,
-    limits: tuple[float, float] | None,
-) -> MechanismAtRest:  # fmt: skip
-    from cdpr_drake.analyses.mechanisms import joint_names, place_mechanism
-    from cdpr_drake.models.plant_rest import hang, settle
-
-    placed = place_mechanism(robot, joints, model=model, pulleys=pulleys)
-    cables, context = placed.cables, placed.context
-    if lengths is None:
-        low, high = placed.mechanism.tension_limits(limits)
-        desired = None if prestress is None else np.squeeze(np.asarray(prestress, float))
-        rest = hang(
-            cables, context, yields=yields, free=joint_names(free), held=joint_names(held),
-            prestress=desired, lower=low if low > 0.0 else None, upper=high,
-        )  # fmt: skip
-    else:
-        l0 = checked_lengths(lengths, cables.routes.count, placed.mechanism.name)
-        rest = settle(cables, context, l0, held=joint_names(held))
-    cables.plant.SetPositions(context, rest.positions)
-    return MechanismAtRest(placed, rest, cables.outputs(context, rest.unstrained_lengths)[2])
