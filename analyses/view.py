@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from cyclopts import Parameter
+
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import ModelWord, refuse_arguments, words
@@ -48,11 +51,9 @@ class View(Result):
         return []
 
     def lines(self) -> list[str]:
-        """Where the page is, and why cables are grey."""
-        problem = self.picture.problem
-        grey = [f"warning: the cables are grey: {problem}"] if problem else []
+        """Where the page is."""
         served = f"{self.name} at {self.place}; Ctrl-C ends"
-        return [*grey, plain_words(str(self.place) if isinstance(self.place, Path) else served)]
+        return [plain_words(str(self.place) if isinstance(self.place, Path) else served)]
 
     def show(self, console: Any) -> None:
         """Prints its lines; a page that is served stays until Ctrl-C."""
@@ -67,10 +68,11 @@ def view(
     robot: ModelWord, *,
     html: Annotated[Path | None, words(Path, "a file that ends in .html", "FILE")] = None,
     host: str | None = None, port: int | None = None,
+    follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
 ) -> View:  # fmt: skip
     """Shows a robot or a mechanism at its home, held by its cables, in Meshcat.
 
-    If no tensions hold it there, its cables are grey and a line gives the reason.
+    If no tensions hold it there, its cables are grey and a line on stderr gives the reason.
 
     Args:
         robot: Robot or mechanism by name or file.
@@ -78,6 +80,7 @@ def view(
         host: Name or address of this machine at which Meshcat listens, * for all; default: only
             this machine can connect.
         port: Port of Meshcat; default: a free one from 7000 to 7099.
+        follow: Hears why the cables are grey.
 
     Raises:
         OutputFolderError: The file is not accepted, or is there and no page of Meshcat.
@@ -94,6 +97,8 @@ def view(
     meshcat = open_meshcat(host or LOCAL, port) if html is None else open_meshcat()
     draw: Any = mechanism_picture if isinstance(loaded, Mechanism) else robot_picture
     picture = draw(loaded, meshcat)
+    if picture.problem:
+        follow.say(f"warning: the cables are grey: {picture.problem}")
     if html is None:
         return View(loaded.name, picture, page_address(picture.meshcat, host or LOCAL))
     try:
