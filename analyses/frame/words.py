@@ -49,7 +49,10 @@ def words(
     def convert(_kind: Any, tokens: Sequence[Token]) -> Any:
         return [value(token) for token in tokens] if many else value(tokens[0])
 
-    return Parameter(name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer)
+    return Parameter(
+        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer,
+        json_list=False, json_dict=False,
+    )  # fmt: skip
 
 
 def numbers(*sizes: int, by: str = ",") -> Callable[[str], Array]:

@@ -159,6 +159,7 @@ def test_a_mechanism_has_options_of_its_own(capsys):
         ("acrobot_large --lengths .2,.2,.2,.2,.2,.2,.2,.2", "is stretched by 5"),
         ("acrobot_large --lengths 3,3,3,3,3,3,3,3", "outside the frame"),
         ("acrobot_large --joint elbow=0 --yields pose", "--joint, --yields: found with a robot"),
+        ("cable_arm --joint=[] --joint=elbow=1", "--joint: found '[]'; accepted: name=value"),
         ("cable_arm --pose 0,0,1", "--pose: found with a mechanism"),
         ("cable_arm --lengths 1,1,1,1 --prestress 5", "--prestress: found with --lengths"),
         ("planar --lengths .6,.6,.6,.6", "no pose in the frame has them"),
