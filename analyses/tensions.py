@@ -284,7 +284,7 @@ def solve_tensions(
             (m,).
         length_scale: Length by which slack_relaxed and log_barrier divide moments [m]; default:
             root mean square distance of the anchor points from Po.
-        joints: Of a mechanism: position of a joint [rad, m]; default: its home.
+        joints: Of a mechanism: position of a joint [rad, m], may be repeated; default: its home.
         held: Of a mechanism: joints that motors hold; default: those with actuators.
 
     Raises:

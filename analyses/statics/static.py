@@ -156,7 +156,7 @@ def solve_static(
         model: Cable model; default: the robot file's, or elastic.
         pulleys: Take the robot's pulleys into account; without them cables run from fixed exit
             points.
-        joints: Of a mechanism: position of a joint [rad, m]; default: its home.
+        joints: Of a mechanism: position of a joint [rad, m], may be repeated; default: its home.
         yields: Of a mechanism: prestress (joints stay where they are, and tensions are as near to
             the prestress as they can be; default) or pose (joints move until tensions are the
             prestress).
