@@ -17,10 +17,3 @@ def aside(planar):
     return cdpr.Pose(
         position=np.array([0.1, -0.05, planar.plane_height]), angles_deg=np.array([0.0, 0.0, 5.0])
     )
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder of its own, where a command is called."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path

@@ -8,7 +8,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot, robot_text
-from tests.analyses.front.front_checks import one_line, shows_itself
+from tests.analyses.front.front_checks import shows_itself
 from tests.cli.commands import answer, told
 
 
@@ -83,22 +83,6 @@ def test_rests_have_the_lengths_or_the_position():
     shows_itself(there)
     for rest in there.rests:
         np.testing.assert_allclose(rest.X_WP.translation(), three.home.position, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({}, "neither"),
-        ({"position": [0, 0, 0.3], "taut": ["C9"]}, "C9"),
-        ({"lengths": [1.0] * 4, "taut": ["C1"]}, "taut"),
-        ({"lengths": [1.0] * 4, "searches": 0}, "searches"),
-        ({"lengths": [1.0] * 4, "seed": -1}, "seed"),
-        ({"position": [0, 0, 0.3], "model": "elastic"}, "inextensible"),
-        ({"position": [0, 0]}, "position"),
-    ],
-)
-def test_refusals(arguments, words):
-    one_line(lambda: cdpr.find_equilibria("spider_camera", **arguments), words)
 
 
 def test_a_search_can_be_followed_and_stopped(hung):

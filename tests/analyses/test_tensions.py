@@ -13,7 +13,7 @@ from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
 from cdpr_drake.tensions import methods
 from cdpr_drake.tensions.methods import METHODS, distribute
 from tests.analyses.front.front_checks import one_line, shows_itself
-from tests.cli.commands import answer, refuse, told
+from tests.cli.commands import answer, told
 from tests.figure_faults import figure_faults
 
 PRINTED = [2.08, 2.08, 2.43, 2.58, 3.74, 4.30, 12.76, 13.31]
@@ -134,29 +134,3 @@ def test_a_mechanism_is_answered_in_the_same_words(capsys, tmp_path):
     assert "8 cables control 6 of 8 rows" in said
     assert "moment at arm_on_platform::shoulder" in said
     assert (tmp_path / "a.png").stat().st_size > 1000
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("acrobot_larg --pose 0,0,0.3", "did you mean"),
-        ("acrobot_large --pose 0,0", "--pose: found '0,0'"),
-        ("acrobot_large --pose 0,0,nan", "--pose: found '0,0,nan'"),
-        ("acrobot_large --pose 0,0,9", "outside the frame"),
-        ("acrobot_large --wrench 1,2", "--wrench"),
-        ("acrobot_large --wrench 0,0,0,1,0,0 --force 1,0,0", "--wrench, --force: found both"),
-        ("acrobot_large --limits 5,2", "lower <= upper"),
-        ("acrobot_large --limits=-5,2", ">= 0 [N]"),
-        ("acrobot_large --mass=-1", "mass: found -1"),
-        ("acrobot_large --method foo", "barycenter"),
-        ("acrobot_large --method kernel", "redundancy m - n = 2"),
-        ("acrobot_large --method reference_program", "no reference"),
-        ("acrobot_large --joint elbow=1", "--joint: found with a robot"),
-        ("cable_arm --mass 3 --pose 0,0,1", "--pose, --mass: found with a mechanism"),
-        ("planar --plot polygon=x.png", "found 'polygon'; accepted: tensions, wrenches"),
-        ("acrobot_large --plot no/such/x.png", "cannot be written"),
-    ],
-)
-def test_refusals_are_one_line_and_nothing_is_written(capsys, here, arguments, words):
-    assert words in refuse(capsys, "tension", *arguments.split())
-    assert list(here.iterdir()) == []

@@ -14,7 +14,7 @@ from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
-from tests.cli.commands import answer, refuse, told
+from tests.cli.commands import answer, told
 from tests.figure_faults import figure_faults
 
 X_WP = pose_from_angles([0.1, 0.05, 0.4], [0.0, 0.0, 0.1])
@@ -143,36 +143,6 @@ def test_a_mechanism_has_options_of_its_own(capsys):
     assert min(free["tensions_n"]) >= 5.0
     assert free["positions"]["cable_arm::shoulder"] == [0.2]
     assert figure_faults(result.plot()) == []
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("acrobot_large --pose 0,0,0.4 --lengths 1,1,1,1,1,1,1,1", "--pose, --lengths: found both"),
-        ("acrobot_large --pose 0,0", "--pose: found '0,0'"),
-        ("acrobot_large --lengths 1,1,1", "--lengths: found shape (3,); accepted: (8,)"),
-        ("acrobot_large --lengths 1,1,1,1,1,1,1,-1", "--lengths: found -1; accepted: > 0"),
-        ("acrobot_large --pose 0,0,5", "outside the frame"),
-        ("acrobot_large --pose 0.5,0.5,1.1", "reaches into the platform"),
-        ("acrobot_large --pose 0.5,0,0.5", "no tensions within 0..60 N"),
-        ("acrobot_large --cable-model rubber", "--cable-model: found 'rubber'"),
-        ("acrobot_large --lengths .2,.2,.2,.2,.2,.2,.2,.2", "is stretched by 5"),
-        ("acrobot_large --lengths 3,3,3,3,3,3,3,3", "outside the frame"),
-        ("acrobot_large --joint elbow=0 --yields pose", "--joint, --yields: found with a robot"),
-        ("cable_arm --joint=[] --joint=elbow=1", "--joint: found '[]'; accepted: name=value"),
-        ("cable_arm --pose 0,0,1", "--pose: found with a mechanism"),
-        ("cable_arm --lengths 1,1,1,1 --prestress 5", "--prestress: found with --lengths"),
-        ("planar --lengths .6,.6,.6,.6", "no pose in the frame has them"),
-        ("planar --lengths .713,.713,.713,.713 --cable-model inextensible", "mm longer"),
-        ("planar --plot no/such/x.png", "cannot be written"),
-        ("nonsense.yaml --pose 0,0", "--pose"),
-        ("nonsense.yaml", "nonsense.yaml"),
-    ],
-)
-def test_refusals_are_one_line_and_nothing_is_written(capsys, here, arguments, words):
-    (here / "nonsense.yaml").write_text("nonsense\n")
-    assert words in refuse(capsys, "static", *arguments.split())
-    assert [path.name for path in here.iterdir()] == ["nonsense.yaml"]
 
 
 def test_refusals_of_a_call(planar, aside):
