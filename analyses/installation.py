@@ -194,12 +194,9 @@ def compile_step(name: str) -> None:
 
 
 def _distribute() -> None:
-    from cdpr_drake.analyses.statics.tension_query import solve_all
-    from cdpr_drake.models.robot_loader import load_robot
-    from cdpr_drake.models.robot_statics import tension_problem
+    from cdpr_drake.analyses.tensions import ALL, solve_tensions
 
-    robot = load_robot("acrobot_large")
-    solve_all(tension_problem(robot, robot.home.transform()))
+    solve_tensions("acrobot_large", method=ALL)
 
 
 def _simulate(name: str, overrides: Sequence[str]) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -13,6 +12,8 @@ import numpy as np
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
+    OF_MECHANISMS,
+    OF_ROBOTS,
     Joints,
     Limits,
     ModelWord,
@@ -21,22 +22,33 @@ from cdpr_drake.analyses.frame.words import (
     Vector,
     Wrench,
     one_of,
+    refuse_arguments,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_loader import as_robot, names_mechanism
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.models.robot_statics import as_pose, as_wrench, tension_problem, wrench_balance
+from cdpr_drake.models.robot_statics import as_pose, as_wrench, wrench_balance
 from cdpr_drake.summaries import numbers
-from cdpr_drake.tensions.methods import METHODS, distribute, feasible_polygon, solution_space
+from cdpr_drake.tensions.methods import (
+    METHODS,
+    TensionMethod,
+    distribute,
+    feasible_polygon,
+    solution_space,
+)
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
-from cdpr_drake.tensions.shortfall import Shortfall, shortfall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdpr_drake.models.mechanism_schema import Mechanism
     from cdpr_drake.statics.controlled_wrenches import WrenchControl
+    from cdpr_drake.tensions.shortfall import Shortfall
+
+TENSION_METHODS: Mapping[str, TensionMethod] = METHODS
+"""Methods of `solve_tensions` and `distribute` by name; a new one is a row of
+`tensions.methods.METHODS`."""
 
 ALL = "all"
 """In the place of a method: each that applies."""
@@ -105,8 +117,12 @@ class Tensions(Result):
         """By how much tensions miss the wrench; None where some balance it."""
         if self.control is not None:
             return self.control.shortfall()
-        none = any(one.status == TensionStatus.INFEASIBLE for one in self.solutions)
-        return shortfall(self.problem) if none and self.problem is not None else None
+        none = any(each.status == TensionStatus.INFEASIBLE for each in self.solutions)
+        if self.problem is None or not none:
+            return None
+        from cdpr_drake.tensions.shortfall import shortfall
+
+        return shortfall(self.problem)
 
     def uncontrolled(self) -> list[dict[str, Any]]:
         """For each twist that changes no length: the combination of the wrench that no tensions
@@ -145,8 +161,8 @@ class Tensions(Result):
         missing = self.control.tensions is None
         uncontrolled = self.uncontrolled()
         if not of_robot:
-            uncontrolled = [{k: one[k] for k in ("combination", "unbalanced")}
-                            for one in uncontrolled]  # fmt: skip
+            uncontrolled = [{key: row[key] for key in ("combination", "unbalanced")}
+                            for row in uncontrolled]  # fmt: skip
         result |= {
             "method": UNDERACTUATED, "rank": self.control.rank, "status": self.status,
             "tensions_n": None if missing else self.tensions.tolist(),
@@ -157,7 +173,7 @@ class Tensions(Result):
     def tables(self) -> list[Table]:
         """Tensions by method and cable."""
         title = f"{self.place}: tensions [N], {self.geometry}"
-        answers = {one.method: (str(one.status), one.tensions) for one in self.solutions}
+        answers = {each.method: (str(each.status), each.tensions) for each in self.solutions}
         answers = answers or {UNDERACTUATED: (self.status, self.tensions)}
         return [Table(title, ("method", "status", *self.cables), [
             (method, status, *(f"{t:.2f}" if np.isfinite(t) else "-" for t in tensions))
@@ -176,8 +192,8 @@ class Tensions(Result):
                 f"{len(self.cables)} cables control {self.control.rank} of {len(self.rows)} rows; "
                 "no tensions change these, all of which are zero at rest:"
             )
-            result += [f"  {one['combination']}: {one['unbalanced']:.4g}"
-                       for one in self.uncontrolled()]  # fmt: skip
+            result += [f"  {row['combination']}: {row['unbalanced']:.4g}"
+                       for row in self.uncontrolled()]  # fmt: skip
         if self.shortfall is not None:
             rows = self.shortfall.rows(list(self.cables), self.rows)
             result += [f"{label}: {words}" for label, words in rows]
@@ -194,14 +210,14 @@ class Tensions(Result):
         return result
 
     def _draw_tensions(self) -> Figure:
-        from cdpr_drake.analyses.statics.static_figures import tension_figure
+        from cdpr_drake.analyses.tension_figures import tension_figure
 
-        by_method = {one.method: one.tensions for one in self.solutions}
+        by_method = {each.method: each.tensions for each in self.solutions}
         by_method = by_method or {UNDERACTUATED: self.tensions}
         return tension_figure(self.cables, by_method, self.bounds, self._title())
 
     def _draw_polygon(self) -> Figure:
-        from cdpr_drake.analyses.statics.static_figures import polygon_figure
+        from cdpr_drake.analyses.tension_figures import polygon_figure
 
         assert self.problem is not None
         return polygon_figure(self.problem, self.solutions, self._title())
@@ -224,7 +240,7 @@ class Tensions(Result):
 def applicable_methods(problem: TensionProblem) -> list[str]:
     """Names of the methods that take this redundancy, and a reference if they need one."""
     return [
-        name for name, method in METHODS.items() if method.takes(problem.redundancy)
+        name for name, method in TENSION_METHODS.items() if method.takes(problem.redundancy)
         and (problem.reference is not None or not method.needs_reference)
     ]  # fmt: skip
 
@@ -238,15 +254,15 @@ def polygon_tensions(problem: TensionProblem) -> list[list[float]]:
 @verb()
 def solve_tensions(
     robot: ModelWord, pose: PoseWord = None, wrench: Wrench = None,
-    method: Annotated[str, one_of((*METHODS, ALL))] = "quadratic_program", *,
+    method: Annotated[str, one_of((*TENSION_METHODS, ALL))] = "quadratic_program", *,
     force: Vector = None, moment: Vector = None, pulleys: bool = True, limits: Limits = None,
     mass: float | None = None, reference: float | None = None, length_scale: float | None = None,
     joints: Joints = None, held: SomeNames = None,
 ) -> Tensions:  # fmt: skip
     """Finds cable tensions that hold the platform at a pose, or proves that there are none.
 
-    W t + w = 0 with lower <= t <= upper; w is the weight and the wrench that is given. Of a
-    mechanism W = -J_l' on the rows that no motor holds, with the length Jacobian J_l, and w the
+    W t + w = 0 with lower <= t <= upper; w is the weight plus the wrench. Of a mechanism
+    W = -J_l' on the rows that no motor holds, with the length Jacobian J_l, and w is the
     generalized force of gravity and of its springs.
 
     If the cables do not control all of w, as fewer cables than degrees of freedom, the answer says
@@ -268,7 +284,7 @@ def solve_tensions(
             (m,).
         length_scale: Length by which slack_relaxed and log_barrier divide moments [m]; default:
             root mean square distance of the anchor points from Po.
-        joints: Of a mechanism: position of a joint [rad, m]; default: its home.
+        joints: Of a mechanism: position of a joint [rad, m], may be repeated; default: its home.
         held: Of a mechanism: joints that motors hold; default: those with actuators.
 
     Raises:
@@ -278,18 +294,19 @@ def solve_tensions(
 
     Source: servoing thesis 1.2.2, (1.27); Gazebo thesis 6.2.
     """
-    if _is_mechanism(robot):
-        _refuse("mechanism", pose=pose, wrench=wrench, force=force, moment=moment, mass=mass)
+    if names_mechanism(robot):
+        refuse_arguments(OF_ROBOTS, pose=pose, wrench=wrench, force=force, moment=moment, mass=mass)
         return _of_mechanism(
             robot, method, dict(joints or {}), held, pulleys, limits, reference, length_scale
         )
-    _refuse("robot with one platform", joints=joints, held=held)
+    refuse_arguments(OF_MECHANISMS, joints=joints, held=held)
     loaded = as_robot(robot, "solve_tensions")
     X_WP, load = as_pose(loaded, pose), as_wrench(wrench, force, moment)
-    cables, m = loaded.cable_set(pulleys), len(loaded.cables)
-    common = {"limits": limits, "mass": mass, "length_scale": length_scale, "cables": cables}
-    balance = wrench_balance(loaded, X_WP, load, **common)  # type: ignore[arg-type]
-    answer = {
+    balance = wrench_balance(
+        loaded, X_WP, load, limits=limits, mass=mass, length_scale=length_scale,
+        cables=loaded.cable_set(pulleys),
+    )  # fmt: skip
+    answer: dict[str, Any] = {
         "subject": loaded, "place": f"{loaded.name} at ({numbers(X_WP.translation())}) m",
         "geometry": loaded.geometry_words(pulleys),
         "cables": tuple(cable.name for cable in loaded.cables),
@@ -303,10 +320,10 @@ def solve_tensions(
                 f"{loaded.name}; accepted: {UNDERACTUATED}"
             )
         return Tensions(**answer, control=balance.control())
-    wanted = np.full(m, reference) if reference is not None and np.ndim(reference) == 0 else (
-        reference
+    problem = TensionProblem(
+        balance.W, balance.wrench, balance.lower, balance.upper,
+        _desired(reference, len(loaded.cables)), balance.row_scale,
     )  # fmt: skip
-    problem = tension_problem(loaded, X_WP, load, reference=wanted, **common)  # type: ignore[arg-type]
     return Tensions(**answer, problem=problem, solutions=_solutions(problem, method))
 
 
@@ -314,7 +331,7 @@ def _of_mechanism(
     robot: Any, method: str, joints: Mapping[str, Any], held: Sequence[str] | None, pulleys: bool,
     limits: tuple[float, float] | None, reference: Any, length_scale: float | None,
 ) -> Tensions:  # fmt: skip
-    from cdpr_drake.analyses.front.mechanisms import place_mechanism
+    from cdpr_drake.analyses.mechanisms import place_mechanism
     from cdpr_drake.statics.controlled_wrenches import wrench_control
     from cdpr_drake.tensions.quadratic_program_kernel import RANK_TOLERANCE
 
@@ -329,7 +346,7 @@ def _of_mechanism(
     wrench, m = placed.cables.other_forces(placed.context)[rows], placed.cables.routes.count
     lower, upper = (np.full(m, limit) for limit in placed.mechanism.tension_limits(limits))
     scale = _row_scale(W, turns[rows], length_scale)
-    answer = {
+    answer: dict[str, Any] = {
         "subject": placed.mechanism, "place": placed.mechanism.name, "geometry": placed.geometry,
         "cables": placed.cables.routes.names, "rows": tuple(words[row] for row in rows),
         "wrench": wrench, "bounds": (lower, upper),
@@ -342,8 +359,7 @@ def _of_mechanism(
                 f"{placed.mechanism.name}; accepted: {UNDERACTUATED}"
             )
         return Tensions(**answer, control=wrench_control(W, wrench, lower, upper, scale))
-    wanted = None if reference is None else np.broadcast_to(np.asarray(reference, float), (m,))
-    problem = TensionProblem(W, wrench, lower, upper, wanted, scale)
+    problem = TensionProblem(W, wrench, lower, upper, _desired(reference, m), scale)
     return Tensions(**answer, problem=problem, solutions=_solutions(problem, method))
 
 
@@ -352,19 +368,11 @@ def _solutions(problem: TensionProblem, method: str) -> tuple[TensionSolution, .
     return tuple(distribute(problem, name) for name in methods)
 
 
-def _is_mechanism(robot: Any) -> bool:
-    if isinstance(robot, str | Path):
-        return names_mechanism(robot)
-    return not isinstance(robot, Robot) and hasattr(robot, "home") and hasattr(robot.home, "joints")
-
-
-def _refuse(kind: str, **arguments: object) -> None:
-    """Refuses arguments that say nothing about a kind of robot."""
-    there = [name for name, value in arguments.items() if value is not None]
-    if there:
-        raise TensionProblemError(
-            f"{', '.join(there)}: found with a {kind}; accepted: with the other kind"
-        )
+def _desired(reference: Any, m: int) -> Array | None:
+    """Desired tensions, shape (m,) [N], of one for all cables."""
+    if reference is None or np.ndim(reference) > 0:
+        return None if reference is None else np.asarray(reference, float)
+    return np.full(m, float(reference))
 
 
 def _row_scale(W: Array, turns: Array, length_scale: float | None) -> Array:

@@ -7,6 +7,7 @@ is loaded. In a process of somebody else's, `one_blas_thread` holds it for the t
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
@@ -21,14 +22,29 @@ ONE_THREAD: Mapping[str, str] = {
 """What libraries of linear algebra read when they are loaded."""
 
 
+_begun_with_one = False
+"""True in a process that has had one thread since before NumPy was loaded."""
+
+
+def begin_with_one_thread() -> None:
+    """Gives this process and its children one thread, before NumPy is loaded."""
+    global _begun_with_one
+    os.environ.update(ONE_THREAD)
+    _begun_with_one = "numpy" not in sys.modules
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
     """Linear algebra of this process in one thread; what was set before holds again afterwards.
 
-    Also a decorator: `@one_blas_thread()`.
+    Also a decorator: `@one_blas_thread()`. It imports SciPy, except in a process that began with
+    one thread.
 
     Source: threadpoolctl.
     """
+    if _begun_with_one:
+        yield
+        return
     with _libraries().limit(limits=1, user_api="blas"):
         yield
 

@@ -21,7 +21,7 @@ SCENARIO_KEY = "kind"
 
 TAKEN_BY = (
     "cdpr check, static, tension, view, export to caspr, and scenarios of kind mechanism; "
-    "hang_mechanism, solve_mechanism_tensions"
+    "solve_static, solve_tensions"
 )
 """What takes mechanisms, for messages."""
 

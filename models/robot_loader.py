@@ -22,7 +22,6 @@ from cdpr_drake.cables.models import CABLE_MODELS, check_model
 from cdpr_drake.errors import CableModelError, Problems, RobotFileError, why_not_read
 from cdpr_drake.geometry.motion_type import across
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
 from cdpr_drake.models.exit_points import MARK, check_rail, split_name
 from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.materials import check_materials
@@ -101,6 +100,8 @@ def robot_file(name: str) -> Path:
         file = path.suffix or "/" in name
         hint = f"; the path of a robot file has to end in {', '.join(SUFFIXES)}" if file else ""
         known = "cdpr robots lists the names" if file else closest(name, robot_names())
+        if not file and input_there(Path(f"{name}.yaml")):
+            known = f"did you mean {name}.yaml?"
         raise RobotFileError(f"robot {name!r} is unknown; {known}{hint}")
     return _FOLDER / name / "robot.yaml"
 
@@ -168,8 +169,10 @@ def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:
     return robot
 
 
-def names_mechanism(name: str | Path) -> bool:
-    """Whether a name or path is that of a mechanism; also False where there is no such file."""
+def names_mechanism(name: Robot | Mechanism | str | Path) -> bool:
+    """Whether this is a mechanism, or its name or path; also False where there is no such file."""
+    if not isinstance(name, str | Path):
+        return isinstance(name, Mechanism)
     try:
         return is_mechanism(robot_file(str(name)))
     except RobotFileError:
@@ -342,6 +345,8 @@ def _check_exits(robot: Robot, fail: Callable[[str, object, str], None]) -> None
 
 def _check_cameras(robot: Robot, path: Path, problems: Problems) -> None:
     """Refuses cameras of the same name, of no catalogue, or of a wrong file; resolves the files."""
+    from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names, resolved_camera
+
     mounts = [mount.name for mount in robot.cameras]
     for index, mount in enumerate(robot.cameras):
         place, named = f"{path}: cameras[{index}]", mount.name

@@ -17,7 +17,6 @@ from cdpr_drake.errors import RobotFileError, TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
-from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
@@ -34,12 +33,13 @@ from cdpr_drake.schema.fields import (
     text,
 )
 from cdpr_drake.summaries import Summarized, numbers
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.groups import WinchGroups
-from cdpr_drake.winches.motor import WinchLaw
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # statics need none of them
     from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
+    from cdpr_drake.geometry.platform_joint import PlatformJoint
+    from cdpr_drake.winches.drum import Drum
+    from cdpr_drake.winches.groups import WinchGroups
+    from cdpr_drake.winches.motor import WinchLaw
 
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
@@ -409,11 +409,11 @@ class Robot(Summarized):
             return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
         return np.asarray(self.platform.box_center, float)
 
-    def drum(self) -> Drum:
+    def drum(self) -> "Drum":
         """Drums and gears of the winches, blocks and tackles included."""
         return self.winch.drum(self._drum_diameter(), *self._own_drums())
 
-    def winch_law(self) -> WinchLaw:
+    def winch_law(self) -> "WinchLaw":
         """The winches with their motors.
 
         Raises:
@@ -429,8 +429,10 @@ class Robot(Summarized):
             )
         return law
 
-    def winch_groups(self) -> WinchGroups:
+    def winch_groups(self) -> "WinchGroups":
         """Which cables are on which winch."""
+        from cdpr_drake.winches.groups import WinchGroups
+
         return WinchGroups.of_names([cable.winch for cable in self.cables])
 
     def _drum_diameter(self) -> float | Array:
@@ -482,8 +484,10 @@ class Robot(Summarized):
             )
         return rows
 
-    def joint(self) -> PlatformJoint:
+    def joint(self) -> "PlatformJoint":
         """What the platform moves by in a simulation."""
+        from cdpr_drake.geometry.platform_joint import PlatformJoint
+
         return PlatformJoint.of(self.motion_type(), self.home.transform(), self.plane_height)
 
     def reach(self) -> tuple[Array, Array]:

@@ -187,8 +187,9 @@ def as_wrench(
         return None
     if wrench is not None:
         if force is not None or moment is not None:
+            other = "moment" if force is None else "force"
             raise TensionProblemError(
-                "wrench: found force or moment too; accepted: wrench, or force and moment"
+                f"wrench, {other}: found both; accepted: a wrench, or a force and a moment"
             )
         parts = {"wrench": (wrench, 6, "(moment [N m], force [N])")}
     numbers = []

@@ -18,10 +18,8 @@ from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
-from cdpr_drake.models.drake_parsing import drake_refusals, try_mesh
 from cdpr_drake.schema.fields import array, number, sections, switch, text
 from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
-from cdpr_drake.schema.json_text import load_json
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
 
@@ -89,6 +87,8 @@ class PlatformShape:
         X_PS, size = self.pose(middle), np.zeros(3)
         R = X_PS.rotation().matrix()
         if self.kind == MESH:
+            from cdpr_drake.models.drake_parsing import drake_refusals
+
             assert self.file is not None
             with drake_refusals(f"{self.file}: cannot be read as a mesh"):
                 file = mesh_in_place(Path(self.file))
@@ -156,6 +156,8 @@ def _check_closed(file: str) -> None:
 @lru_cache(maxsize=8)
 def _mesh_corners(file: str, scale: float, changed: int) -> Array:
     """Of the convex hull, shape (3, n) [m], read once for each state of its file."""
+    from cdpr_drake.models.drake_parsing import try_mesh  # which few robots need
+
     try_mesh(Path(file))
     hull = Mesh(file, scale).GetConvexHull()
     return np.array([hull.vertex(i) for i in range(hull.num_vertices())]).T
@@ -168,6 +170,8 @@ def _mesh_inertia(file: str, scale: float, changed: int) -> SpatialInertia:
     Raises:
         RobotFileError: It encloses no volume.
     """
+    from cdpr_drake.models.drake_parsing import drake_refusals
+
     with drake_refusals(f"{file}: {_NO_INERTIA}"):
         _check_closed(file)
         return CalcSpatialInertia(Mesh(file, scale), 1.0)
@@ -185,6 +189,8 @@ def mesh_files(file: Path) -> list[Path]:
                  if line.startswith("mtllib ")]  # fmt: skip
     else:
         try:
+            from cdpr_drake.schema.json_text import load_json
+
             content = load_json(words)
             uris = [item.get("uri", "data:") for key in ("buffers", "images")
                     for item in content.get(key, [])]  # fmt: skip

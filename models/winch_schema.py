@@ -4,15 +4,18 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.schema.fields import number, optional_section, section
-from cdpr_drake.winches.drum import Drum
-from cdpr_drake.winches.friction import FrictionLaw
-from cdpr_drake.winches.groups import WinchGroups
-from cdpr_drake.winches.motor import WinchLaw
+
+if TYPE_CHECKING:  # statics need no winches
+    from cdpr_drake.winches.drum import Drum
+    from cdpr_drake.winches.friction import FrictionLaw
+    from cdpr_drake.winches.groups import WinchGroups
+    from cdpr_drake.winches.motor import WinchLaw
 
 
 @dataclass(kw_only=True)
@@ -33,8 +36,10 @@ class Friction:
         above=0.0,
     )
 
-    def law(self) -> FrictionLaw:
+    def law(self) -> "FrictionLaw":
         """The same for the pure functions."""
+        from cdpr_drake.winches.friction import FrictionLaw
+
         return FrictionLaw(
             self.coulomb, self.static, self.viscous, self.stribeck_speed, self.settling_time
         )
@@ -104,7 +109,7 @@ class Winch:
         cable_diameter: float | Array,
         radii: Array | None = None,
         advantages: Array | None = None,
-    ) -> Drum:
+    ) -> "Drum":
         """The drum with its gear; the cable's centre line is half a diameter [m] outside.
 
         The diameter is one number, or one for each cable, shape (m,); then so are radius and
@@ -114,6 +119,8 @@ class Winch:
 
         Source: servoing thesis (1.1).
         """
+        from cdpr_drake.winches.drum import Drum
+
         radius = (self.drum_radius if radii is None else radii) + cable_diameter / 2.0
         n = 1.0 if advantages is None else advantages
         if self.layers is None:
@@ -125,11 +132,14 @@ class Winch:
     def law(
         self,
         cable_diameter: float | Array,
-        groups: WinchGroups | None = None,
+        groups: "WinchGroups | None" = None,
         radii: Array | None = None,
         advantages: Array | None = None,
-    ) -> WinchLaw | None:
+    ) -> "WinchLaw | None":
         """The winch with its motor; None where the inertia is not known."""
+        from cdpr_drake.winches.friction import FrictionLaw
+        from cdpr_drake.winches.motor import WinchLaw
+
         if self.inertia is None:
             return None
         return WinchLaw(

@@ -34,10 +34,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import cdpr_drake
+from cdpr_drake.analyses import view
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies.study import STUDIES, Study
 from cdpr_drake.analyses.workspaces import stability_figures
-from cdpr_drake.cli import app, doctor, view
+from cdpr_drake.cli import app, doctor
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import cdpr_drake as cdpr
 from cdpr_drake import blas_threads
-from cdpr_drake.analyses.front import tensions
+from cdpr_drake.analyses import tensions
 from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from tests.messages import messages
 
@@ -21,7 +21,8 @@ NO_CALLS = ("Session", "TENSION_METHODS", "environment_names", "make_environment
 """Public names of the front that compute nothing themselves."""
 
 FRONT = Path(cdpr.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-VERBS = [name for name in re.findall(r"front\.\w+ import (\w+)", FRONT) if name not in NO_CALLS]
+MODULES = r"analyses\.(?:front\.\w+|statics\.static|tensions|view|kinematics|equilibria)"
+VERBS = [name for name in re.findall(MODULES + r" import (\w+)", FRONT) if name not in NO_CALLS]
 
 
 def product(seed: int) -> bytes:

@@ -37,7 +37,7 @@ class Result(ABC):
     """An answer. It shows itself alike on a terminal, in a notebook and at Python's prompt."""
 
     @abstractmethod
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any] | list[Any]:
         """All numbers, for JSON; keys end in units."""
 
     @abstractmethod
@@ -86,16 +86,14 @@ class Result(ABC):
         from rich.table import Table as Drawn
 
         for table in self.tables():
-            drawn = Drawn(
-                title=table.title, box=SIMPLE_HEAD, pad_edge=False, title_justify="left",
-                show_header=bool(table.headings),
-            )  # fmt: skip
+            drawn = Drawn(box=SIMPLE_HEAD, pad_edge=False, show_header=bool(table.headings))
             for k in range(max(map(len, (table.headings, *table.rows)), default=0)):
                 right = bool(table.headings) and all(_is_number(row[k]) for row in table.rows)
                 heading = table.headings[k] if table.headings else ""
                 drawn.add_column(heading, justify="right" if right else "left")
             for row in table.rows:
                 drawn.add_row(*row)
+            console.print(table.title, soft_wrap=True)
             console.print(drawn)
         for line in self.lines():
             console.print(line, soft_wrap=True)

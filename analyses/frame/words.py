@@ -35,7 +35,7 @@ def words(
         accepted: What is accepted, for the refusal.
         metavar: What the help shows in the place of the word.
         name: The option, such as --out; None: the argument's name.
-        many: True if the option may be repeated, and the value is a list.
+        many: True if the option may be repeated, and the value is a list; the type is one, too.
         completer: Gives words for completion.
     """
 
@@ -50,8 +50,9 @@ def words(
         return [value(token) for token in tokens] if many else value(tokens[0])
 
     return Parameter(
-        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer
-    )
+        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer,
+        json_list=False, json_dict=False,
+    )  # fmt: skip
 
 
 def numbers(*sizes: int, by: str = ",") -> Callable[[str], Array]:
@@ -178,7 +179,7 @@ SomeNames: TypeAlias = Annotated[
     Sequence[str] | None, words(some_names, "names with commas, or none", "NAME,...|none")
 ]
 Joints: TypeAlias = Annotated[
-    Mapping[str, Any] | None,
+    list[tuple[str, Any]] | Mapping[str, Any] | None,
     words(named_numbers, "name=value, or name=v1,v2 [rad, m]", "NAME=VALUE", name="--joint",
           many=True),
 ]  # fmt: skip
@@ -199,11 +200,27 @@ Overrides: TypeAlias = Annotated[
 ]
 
 
-def one_of(known: Mapping[str, Any] | Sequence[str]) -> Parameter:
-    """One of some names, as METHODS of a room."""
-    return Parameter(choices=tuple(known))
+def one_of(known: Mapping[str, Any] | Sequence[str], name: str | None = None) -> Parameter:
+    """One of some names, as METHODS of a room; `name` is the option's, if not the argument's."""
+    return Parameter(name=name, choices=tuple(known))
 
 
 def is_number(value: object) -> bool:
     """False for a float that is no number or not finite, as nan and inf on a command line."""
     return not isinstance(value, float) or math.isfinite(value)
+
+
+OF_MECHANISMS = "found with a robot with one platform; accepted: with a mechanism"
+OF_ROBOTS = "found with a mechanism; accepted: with a robot with one platform"
+"""Refusals of arguments that say nothing about this kind of `ModelWord`."""
+
+
+def refuse_arguments(why: str, **arguments: object) -> None:
+    """Refuses arguments that have a value.
+
+    Raises:
+        CdprError: One has a value; names it, and says why.
+    """
+    names = ", ".join(name for name, value in arguments.items() if value is not None)
+    if names:
+        raise CdprError(f"{names}: {why}")

@@ -1,7 +1,7 @@
-"""Statics of a robot at one pose, and its modelling errors: numbers, and pictures of them.
+"""Robots and mechanisms at rest, and the modelling errors of robots: numbers and pictures.
 
-* Queries at one pose: tensions, the pose of rest.
-* Modelling errors: two models of the same robot beside each other, cables against rigid rods.
+* `solve_static`: a robot or mechanism at rest, at a pose or with given lengths.
+* Modelling errors: two models of the same robot compared, and cables with rigid rods.
 
 Pictures are imported when they are asked for, since that takes longer than the answers.
 """

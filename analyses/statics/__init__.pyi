@@ -5,5 +5,3 @@ from .modelling_errors import slack_along_path as slack_along_path
 from .modelling_errors import slack_figure as slack_figure
 from .modelling_errors import usual_beliefs as usual_beliefs
 from .modelling_errors import wrong_geometry as wrong_geometry
-from .static_figures import polygon_figure as polygon_figure
-from .tension_query import solve_all as solve_all

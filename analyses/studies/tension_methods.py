@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.studies import tension_trials as tt
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
+from cdpr_drake.analyses.tensions import applicable_methods
 from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
 from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.control.force_balance import FORCE, WRENCH

@@ -22,7 +22,7 @@ from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_each, seconds_per_call
 from cdpr_drake.analyses.simulation.run_loop import advance, fixed_step_simulator
 from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.statics.tension_query import applicable_methods
+from cdpr_drake.analyses.tensions import applicable_methods
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_balance import FORCE, WRENCH, force_problem
 from cdpr_drake.control.task_space import TaskGains

@@ -22,7 +22,11 @@ from typing import Annotated, Any, NoReturn, get_args
 
 from cyclopts import App, CoercionError, CycloptsError, Group, MissingArgumentError, Parameter
 
-from cdpr_drake.blas_threads import ONE_THREAD, one_blas_thread, started_with_one_thread
+from cdpr_drake.blas_threads import (
+    begin_with_one_thread,
+    one_blas_thread,
+    started_with_one_thread,
+)
 from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
 from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
@@ -260,7 +264,7 @@ def main(arguments: list[str] | None = None) -> None:
         with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
             _main(arguments, lambda: None)
         return
-    os.environ.update(ONE_THREAD)  # before NumPy is loaded
+    begin_with_one_thread()
     for each in SIGNALS:
         signal.signal(each, _end_at_once)
     gc.disable()

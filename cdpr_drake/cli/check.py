@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import typer
 
 from cdpr_drake.analyses.front.logs import import_log
-from cdpr_drake.analyses.front.mechanisms import hang_mechanism
 from cdpr_drake.analyses.logs.log_formats import detect_log
+from cdpr_drake.analyses.statics.static import MechanismAtRest, solve_static
 from cdpr_drake.cli.import_log import log_lines
 from cdpr_drake.cli.options import AsJson, check_plots, save_plot
 from cdpr_drake.cli.terminal import print_json, print_words
@@ -97,9 +97,10 @@ def _mechanism_notes(path: Path) -> list[str]:
     """What a user may want to know of a mechanism; raises what is wrong with its file."""
     mechanism = load_mechanism(path)
     try:
-        found = hang_mechanism(mechanism)
+        found = solve_static(mechanism)
     except CdprError as problem:
         return [f"the home positions: {problem}"]
+    assert isinstance(found, MechanismAtRest)
     falls = found.rest.stability != "stable"
     return [*found.rest.notes, *([f"at home it is {found.rest.stability}"] if falls else [])]
 

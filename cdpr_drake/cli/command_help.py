@@ -9,11 +9,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr simulate caroca_ibvs --camera projected --seeds 0:20",
     ),
     "serve": ("Run", "cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
-    "environments": (
-        "Run",
-        "cdpr environments",
-        "cdpr environments Reach --robot acrobot_small --picture reach.png",
-    ),
     "robots": ("Robots and scenarios", "cdpr robots", "cdpr robots --json"),
     "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
     "new": (
@@ -26,7 +21,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr check mine.yaml",
         "cdpr check robot.yaml scenario.yaml",
     ),
-    "view": ("Robots and scenarios", "cdpr view acrobot_large", "cdpr view two_platforms"),
     "studio": (
         "Robots and scenarios",
         "cdpr studio acrobot_large",
@@ -43,21 +37,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr export caroca --format sdf --out here",
     ),
     "schema": ("Robots and scenarios", "cdpr schema robot", "cdpr schema scenario"),
-    "tension": (
-        "Analyse",
-        "cdpr tension acrobot_large",
-        "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all",
-    ),
-    "static": (
-        "Analyse",
-        "cdpr static acrobot_large",
-        "cdpr static caroca --pose 0,0,1.5 --cable-model catenary",
-    ),
-    "equilibria": (
-        "Analyse",
-        "cdpr equilibria grab_three --position 0.6,1.16,-1.5",
-        "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3",
-    ),
     "workspace": (
         "Analyse",
         "cdpr workspace acrobot_large",

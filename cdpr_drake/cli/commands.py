@@ -33,11 +33,34 @@ FIRST_STEPS = {
 _VERBS = "cdpr_drake.analyses"
 
 COMMANDS = {
+    "environments": Command(
+        "Run", f"{_VERBS}.environments:list_environments",
+        "Lists the Gymnasium environments, with the sizes of action and observation for a robot.",
+        ("cdpr environments",
+         "cdpr environments Reach --robot acrobot_small --picture reach.png"),
+    ),
+    "view": Command(
+        "Robots and scenarios", f"{_VERBS}.view:view",
+        "Shows a robot or a mechanism at its home, held by its cables, in Meshcat.",
+        ("cdpr view acrobot_large", "cdpr view two_platforms"),
+    ),
     "tension": Command(
         "Analyse", f"{_VERBS}.tensions:solve_tensions",
         "Finds cable tensions that hold the platform at a pose, or proves that there are none.",
         ("cdpr tension acrobot_large",
          "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all"),
+    ),
+    "static": Command(
+        "Analyse", f"{_VERBS}.statics.static:solve_static",
+        "Computes lengths, tensions, stiffness, vibrations and sag of a robot at rest.",
+        ("cdpr static acrobot_large",
+         "cdpr static caroca --pose 0,0,1.5 --cable-model catenary"),
+    ),
+    "equilibria": Command(
+        "Analyse", f"{_VERBS}.equilibria:find_equilibria",
+        "Finds all poses of rest, stable or not, with any cables slack, for lengths or a position.",
+        ("cdpr equilibria grab_three --position 0.6,1.16,-1.5",
+         "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3"),
     ),
     "notebooks": Command(
         "Tools", f"{_VERBS}.front.scenarios:load_scenario", "Lists notebooks, or copies them.",

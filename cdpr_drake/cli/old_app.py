@@ -22,7 +22,11 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from cdpr_drake.blas_threads import ONE_THREAD, one_blas_thread, started_with_one_thread
+from cdpr_drake.blas_threads import (
+    begin_with_one_thread,
+    one_blas_thread,
+    started_with_one_thread,
+)
 from cdpr_drake.cli.command_help import COMMANDS, examples_of, first_steps, groups
 from cdpr_drake.cli.completion import PROGRAM, asked_words, stand_in
 from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
@@ -237,7 +241,7 @@ def main(arguments: list[str] | None = None) -> None:
         with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
             _main(arguments)
         return
-    os.environ.update(ONE_THREAD)  # before NumPy is loaded
+    begin_with_one_thread()
     for each in SIGNALS:
         signal.signal(each, _end_at_once)
     gc.disable()

@@ -15,7 +15,6 @@ PACKAGE = "cdpr_drake"
 
 GROUPS = {
     "solve_tensions": "tension",
-    "compare_tensions": "tension",
     "solve_static": "static",
     "compute_workspace": "workspace",
     "assess_stability": "stability",

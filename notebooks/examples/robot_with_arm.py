@@ -8,6 +8,6 @@ mechanism = cdpr.load_mechanism("arm_on_platform")
 print(mechanism)
 for shoulder in np.linspace(-0.6, 0.6, 3):
     joints = {"shoulder": float(shoulder), "elbow": -0.4}
-    held = cdpr.solve_mechanism_tensions(mechanism, joints=joints)
+    held = cdpr.solve_tensions(mechanism, joints=joints)
     print(f"shoulder {shoulder:+.1f} rad: {held.tensions.round(1)} N")
-print(cdpr.hang_mechanism(mechanism, joints={"shoulder": 0.3}))
+print(cdpr.solve_static(mechanism, joints={"shoulder": 0.3}))

@@ -123,7 +123,7 @@ def test_files_of_wrenches_and_obstacles(capsys, here):
 
 @pytest.mark.parametrize(("robot", "pose"), [("acrobot_large", "0,0,0.3"), ("planar", "0.1,0,0.3")])
 def test_sections_of_the_available_wrenches(capsys, here, robot, pose):
-    answer(capsys, "tension", robot, "--pose", pose, "--wrench-set-plot", "wrenches.png")
+    answer(capsys, "tension", robot, "--pose", pose, "--plot", "wrenches=wrenches.png")
     assert (here / "wrenches.png").stat().st_size > 5000
 
 

@@ -26,7 +26,7 @@ SESSION = "cdpr_drake.cli.command_session.CommandSession.computing"
 LONG_WORK = {
     "simulate": [SESSION],
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],
-    "view": ["cdpr_drake.cli.view.open_meshcat"],
+    "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
     "workspace": [SESSION],
     "stability": [SESSION],

@@ -111,7 +111,7 @@ def test_a_wrench_is_given_moments_first_or_by_force_and_moment(capsys):
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"wrench": [0.0] * 6, "force": [0.0] * 3}, "wrench: found force or moment too"),
+        ({"wrench": [0.0] * 6, "force": [0.0] * 3}, "wrench, force: found both"),
         ({"force": [0.0] * 6}, "force: found 6 numbers; accepted: 3"),
         ({"moment": [0.0, 0.0, float("nan")]}, "moment: found .*nan.*; accepted: finite"),
         ({"wrench": [1.0, 2.0, 3.0]}, "wrench: found 3 numbers; accepted: 6"),

@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake import models
-from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
 from cdpr_drake.errors import RobotFileError, TensionProblemError
 from cdpr_drake.models.robot_loader import parse_robot
 from cdpr_drake.models.robot_statics import check_pose

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_vector
 from cdpr_drake.models.robot_statics import rigid_platform, wrench_balance

@@ -6,7 +6,7 @@ import yaml
 from pydrake.math import RigidTransform
 
 from cdpr_drake import models
-from cdpr_drake.analyses.statics.static_query import static_at_pose
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_pose
 from cdpr_drake.analyses.workspaces.pose_grid import check_grid
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import (

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from cdpr_drake.analyses.front.workspaces import compute_workspace
-from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
 from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_statics import wrench_balance
@@ -74,7 +74,7 @@ def test_tension_says_what_cannot_be_controlled(answer):
     assert "infeasible" in aside
     assert "no tensions change" in aside
     four = answer("tension", "hanging_four", "--pose", "0,0,0.3")
-    assert "4 cables for 6 degrees of freedom, which control 4 of them here" in four
+    assert "4 cables control 4 of 6 rows" in four
 
 
 def test_static_finds_the_pose_of_rest_and_its_frequencies(answer):

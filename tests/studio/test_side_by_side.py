@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cdpr_drake.analyses.front.tensions import solve_tensions
+from cdpr_drake.analyses.tensions import solve_tensions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side, runs_side_by_side
 

@@ -12,7 +12,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 
 if TYPE_CHECKING:
-    from cdpr_drake.analyses.statics.static_query import StaticReport
+    from cdpr_drake.analyses.statics.robot_at_rest import RobotAtRest
 
 USUAL_METHOD = "quadratic_program"
 
@@ -50,7 +50,7 @@ class PoseAnswer:
     slack: np.ndarray
     lengths: Array | None
     why_no_tensions: str
-    rest: StaticReport | None
+    rest: RobotAtRest | None
     why_no_rest: str
     capacity_margin: float | None
     clearance: float | None

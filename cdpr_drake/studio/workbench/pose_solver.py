@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.front.statics import solve_static
-from cdpr_drake.analyses.front.tensions import solve_tensions
-from cdpr_drake.analyses.statics.tension_query import applicable_methods
+from cdpr_drake.analyses.statics.robot_at_rest import RobotAtRest
+from cdpr_drake.analyses.statics.static import solve_static
+from cdpr_drake.analyses.tensions import applicable_methods, solve_tensions
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
 from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
 from cdpr_drake.errors import CdprError
@@ -53,7 +53,8 @@ class PoseSolver:
             found["why_no_tensions"] = str(problem)
         rest, why_no_rest = None, ""
         try:
-            rest = solve_static(robot, X_WP)
+            at_rest = solve_static(robot, X_WP)
+            rest = at_rest if isinstance(at_rest, RobotAtRest) else None
         except CdprError as problem:
             why_no_rest = str(problem)
         try:

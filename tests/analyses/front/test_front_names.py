@@ -14,6 +14,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
 from tests.analyses.front.front_checks import HOMES, RESULTS, as_json, one_line, shows_itself
@@ -34,7 +35,7 @@ def test_all_results_tell_draw_and_show_themselves():
     """That they do it well is tested with each."""
     assert len(RESULTS) >= 16
     for kind in RESULTS:
-        assert issubclass(kind, Summarized), kind
+        assert issubclass(kind, Summarized | Result), kind
         assert not inspect.isabstract(kind), kind
         for method in ("as_dict", "plot"):
             assert inspect.isfunction(getattr(kind, method, None)), f"{kind}: {method}"

@@ -5,19 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_dump_typed
 
 import cdpr_drake as cdpr
 from cdpr_drake.cables.cable_behaviour import tension_of_strain
 from cdpr_drake.cables.models import check_model
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.settings import CableSettings
-from tests.messages import printed
 
 STIFFENING, EXPANSION, WARMER, FRICTION = 2e-3, 1.2e-5, 12.0, 0.03
 
@@ -75,7 +72,7 @@ def test_off_is_the_same_to_the_bit():
     assert json.dumps(a) == json.dumps(b)
 
 
-def test_what_does_not_know_them_says_so(tmp_path, capsys):
+def test_what_does_not_know_them_says_so():
     one = robot(stiffening=STIFFENING)
     with pytest.raises(CableModelError, match="found catenary for cables that stiffen or are warm"):
         cdpr.solve_static(one, model="catenary")
@@ -84,19 +81,10 @@ def test_what_does_not_know_them_says_so(tmp_path, capsys):
     assert CableSettings().cable_set(robot(stiffening=0.0)).count == 8
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ([], "tensions at the drums while cable is wound up [N]:"),
-        (["--no-pulleys"], "note: sheave_friction 0.03 of irma4u does nothing without pulleys"),
-    ],
-)
-def test_the_command_prints_drum_tensions_or_that_friction_does_nothing(
-    tmp_path, capsys, more, words
-):
-    path = tmp_path / "robot.yaml"
-    path.write_text(yaml_dump_typed(robot("irma4u", sheave_friction=FRICTION)))
-    with pytest.raises(SystemExit) as ended:
-        main(["static", str(path), "--pose", "0,0,0.4,0,0,0", *more])
-    assert ended.value.code == 0
-    assert words in "".join(printed(capsys))
+def test_a_rest_prints_drum_tensions_or_that_friction_does_nothing():
+    one = robot("irma4u", sheave_friction=FRICTION)
+    for pulleys, words in (
+        (True, "tensions at the drums while cable is wound up [N]:"),
+        (False, "note: sheave_friction 0.03 of irma4u does nothing without pulleys"),
+    ):
+        assert words in repr(cdpr.solve_static(one, [0.0, 0.0, 0.4], pulleys=pulleys))

@@ -1,25 +1,22 @@
 """A platform that rubs rests at no one pose: how far beside, in words, numbers and pictures."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
-from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
-from cdpr_drake.cli.app import main
+from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.materials import BehaviourSettings
 from cdpr_drake.models.robot_schema import HysteresisSettings
+from tests.cli.commands import refuse
 from tests.figure_faults import figure_faults
-from tests.messages import printed
-from tests.motion.small_robots import content, small_robot
+from tests.motion.small_robots import small_robot
 
 WIDEST = 12.0
 """Of a figure whose letters are read where it is shown 690 px wide [inch]."""
@@ -75,43 +72,28 @@ def test_it_may_rest_as_far_as_its_stiffness_lets_contacts_hold_it(name):
     assert at_rest(small_robot(name)).contacts is None
 
 
-def test_the_command_says_so(tmp_path, capsys):
-    platform = content("hanging_four")["platform"] | {"hysteresis": CONTACTS}
-    path = tmp_path / "hanging_four.yaml"
-    path.write_text(yaml.safe_dump(content("hanging_four", platform=platform)))
-    drawn = tmp_path / "does.png"
-    lengths = ",".join(map(str, lengths_at_home(small_robot("hanging_four"))))
-    for more, code in ((["--plot-behaviour", str(drawn)], 0), (["--json"], 0)):
-        with pytest.raises(SystemExit) as stop:
-            main(["static", str(path), "--lengths", lengths, *more])
-        assert stop.value.code == code
-        out = printed(capsys).out
-        if more == ["--json"]:
-            told = json.loads(out)
-            assert told["rests_within_rad"] > 0.0
-            assert told["held_moments_n_m"] == pytest.approx([0.006, 0.006, 0.01])
-        else:
-            assert "rest is not unique: contacts hold moments up to (0.006, 0.006, 0.01) N m" in out
-    assert drawn.stat().st_size > 5000
-    with pytest.raises(SystemExit) as stop:
-        main(["static", "acrobot_small", "--plot-behaviour", str(tmp_path / "none.png")])
-    assert stop.value.code == 2
-    assert "accepted: cable.behaviour or platform.hysteresis" in " ".join(
-        printed(capsys).err.split()
-    )
-    assert not (tmp_path / "none.png").exists()
+def test_a_rest_that_is_not_unique_says_so(capsys, tmp_path):
+    robot = rubbing(small_robot("hanging_four"))
+    rest = cdpr.solve_static(robot, lengths=lengths_at_home(robot))
+    assert rest.as_dict()["rests_within_rad"] > 0.0
+    assert rest.as_dict()["held_moments_n_m"] == pytest.approx([0.006, 0.006, 0.01])
+    words = "rest is not unique: contacts hold moments up to (0.006, 0.006, 0.01) N m"
+    assert words in repr(rest)
+    plain = ("static", "acrobot_small", "--plot", f"behaviour={tmp_path / 'none.png'}")
+    assert "accepted: cable.behaviour or platform.hysteresis" in refuse(capsys, *plain)
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_picture_has_what_the_file_has():
     robot = cdpr.load_robot("irma4u")
     with pytest.raises(CableModelError, match="elastic cables alone"):
-        cdpr.solve_static(robot).plot_behaviour(robot)
+        cdpr.solve_static(robot).plot("behaviour")
     behaviour = BehaviourSettings(
         stiffening=5e-3, sheave_friction=0.05, creep_stiffness=0.3, creep_time=0.3
     )
     robot = rubbing(replace(robot, cable=replace(robot.cable, behaviour=behaviour)))
     report = cdpr.solve_static(robot)
-    figure = report.plot_behaviour(robot)
+    figure = report.plot("behaviour")
     assert figure_faults(figure) == []
     cables, drums, contacts = figure.axes
     assert figure.get_figwidth() < WIDEST

@@ -8,7 +8,6 @@ import pytest
 from scipy.optimize import linprog
 
 from cdpr_drake.analyses.simulation.run_loop import LoopEnd
-from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.studies import tension_trials as trials
 from cdpr_drake.analyses.studies.tension_methods import GAINS, near_instability
 from cdpr_drake.analyses.studies.tension_trials import (
@@ -25,6 +24,7 @@ from cdpr_drake.analyses.studies.tension_trials import (
     run_start_trial,
     run_trial,
 )
+from cdpr_drake.analyses.tensions import applicable_methods
 from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.errors import InfeasibleTensionError

@@ -7,12 +7,11 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from cdpr_drake.analyses.front.mechanisms import (
-    hang_mechanism,
-    place_mechanism,
-    solve_mechanism_tensions,
-)
+from cdpr_drake.analyses.mechanisms import place_mechanism
+from cdpr_drake.analyses.statics.static import solve_static
+from cdpr_drake.analyses.tensions import solve_tensions
 from cdpr_drake.errors import (
+    CdprError,
     EquilibriumError,
     InfeasibleTensionError,
     RobotFileError,
@@ -48,7 +47,7 @@ def test_a_second_of_simulation_does_not_move_it(name):
     cables = add_cables(builder, plant, added.routes())
     still = builder.AddSystem(ConstantVectorSource(np.zeros(added.routes().count)))
     builder.Connect(still.get_output_port(), cables.GetInputPort("cable_velocities"))
-    found = hang_mechanism(name)
+    found = solve_static(name)
     rest = found.rest
     if plant.num_actuators():
         effort = plant.MakeActuationMatrix().T @ rest.held
@@ -68,7 +67,7 @@ def test_a_second_of_simulation_does_not_move_it(name):
 
 
 def test_motors_hold_the_weight_of_the_arm():
-    found = hang_mechanism("arm_on_platform")
+    found = solve_static("arm_on_platform")
     held = found.held()
     upper, lower, g = 0.5, 0.3, 9.81
     # Shoulder at 0.4, elbow at 0.4 - 0.7: lever arms in the vertical plane, links from their ends.
@@ -81,8 +80,8 @@ def test_motors_hold_the_weight_of_the_arm():
 
 def test_a_passive_arm_hangs_straight_down():
     with pytest.raises(InfeasibleTensionError, match="arm_on_platform::"):
-        hang_mechanism("arm_on_platform", held=[], free=[])
-    found = hang_mechanism("arm_on_platform", held=[])
+        solve_static("arm_on_platform", held=[], free=[])
+    found = solve_static("arm_on_platform", held=[])
     q = found.placed.positions(found.rest.positions)
     assert [q[name][0] for name in JOINTS] == pytest.approx([0.0, 0.0], abs=STILL)
     assert q["arm_on_platform::platform"][:3] == [0.0, 0.0, 0.5]
@@ -92,7 +91,7 @@ def test_a_passive_arm_hangs_straight_down():
 
 def test_an_arm_that_stands_upright_is_unstable():
     up = dict(zip(JOINTS, (2.5, 0.0), strict=True))
-    found = hang_mechanism("arm_on_platform", joints=up, held=[])
+    found = solve_static("arm_on_platform", joints=up, held=[])
     q = found.placed.positions(found.rest.positions)
     assert q[JOINTS[0]][0] == pytest.approx(np.pi, abs=STILL)
     assert found.rest.stability == "unstable"
@@ -100,8 +99,8 @@ def test_an_arm_that_stands_upright_is_unstable():
 
 
 def test_prestress_or_pose_yields():
-    kept = hang_mechanism("cable_arm", prestress=50.0)
-    moved = hang_mechanism("cable_arm", prestress=50.0, yields="pose")
+    kept = solve_static("cable_arm", prestress=50.0)
+    moved = solve_static("cable_arm", prestress=50.0, yields="pose")
     home = kept.placed.plant.GetPositions(kept.placed.plant.CreateDefaultContext())
     np.testing.assert_array_equal(kept.rest.positions, home)
     assert np.max(np.abs(moved.rest.tensions - 50.0)) < 1e-3
@@ -109,41 +108,45 @@ def test_prestress_or_pose_yields():
 
 
 def test_lengths_say_where_it_rests():
-    hung = hang_mechanism("mobile_bases")
-    again = hang_mechanism("mobile_bases", hung.rest.unstrained_lengths)
+    hung = solve_static("mobile_bases")
+    again = solve_static("mobile_bases", lengths=hung.rest.unstrained_lengths)
     np.testing.assert_allclose(again.rest.positions, hung.rest.positions, atol=STILL)
     shorter = hung.rest.unstrained_lengths.copy()
     shorter[::2] -= 0.02  # the upper cables
-    z = hang_mechanism("mobile_bases", shorter).rest.positions[-1]
+    z = solve_static("mobile_bases", lengths=shorter).rest.positions[-1]
     platform = hung.placed.positions(hung.rest.positions)["platform::platform"]
-    lifted = hang_mechanism("mobile_bases", shorter)
+    lifted = solve_static("mobile_bases", lengths=shorter)
     assert lifted.placed.positions(lifted.rest.positions)["platform::platform"][2] > platform[2]
     assert np.isfinite(z)
-    with pytest.raises(EquilibriumError, match="prestress: found with lengths"):
-        hang_mechanism("mobile_bases", shorter, prestress=5.0)
+    with pytest.raises(CdprError, match="prestress: found with lengths"):
+        solve_static("mobile_bases", lengths=shorter, prestress=5.0)
 
 
 @pytest.mark.parametrize("name", mechanism_names())
 def test_tensions_of_least_norm_are_those_of_hang(name):
-    tensions = solve_mechanism_tensions(name)
+    tensions = solve_tensions(name)
     assert tensions.status == "feasible"
-    np.testing.assert_allclose(tensions.tensions, hang_mechanism(name).rest.tensions, atol=SAME)
+    np.testing.assert_allclose(tensions.tensions, solve_static(name).rest.tensions, atol=SAME)
 
 
 def test_the_weight_has_its_sign():
     # A suspended mechanism tells the sign of the wrench; a fully constrained one does not.
-    found = solve_mechanism_tensions("mobile_bases", limits=(0.0, 1000.0))
-    J = found.placed.cables.length_jacobian(found.placed.context)
-    weight = found.placed.cables.other_forces(found.placed.context)
+    found, placed = (
+        solve_tensions("mobile_bases", limits=(0.0, 1000.0)),
+        place_mechanism("mobile_bases"),
+    )
+    J = placed.cables.length_jacobian(placed.context)
+    weight = placed.cables.other_forces(placed.context)
     left = (weight - J.T @ found.tensions)[-6:]
     assert np.max(np.abs(left)) < 1e-6
     assert weight[-1] == pytest.approx(-98.1)
 
 
 def test_every_method_balances():
-    found = solve_mechanism_tensions("cable_arm", "all")
-    W = -found.placed.cables.length_jacobian(found.placed.context).T
-    w = found.placed.cables.other_forces(found.placed.context)
+    found = solve_tensions("cable_arm", method="all")
+    placed = place_mechanism("cable_arm")
+    W = -placed.cables.length_jacobian(placed.context).T
+    w = placed.cables.other_forces(placed.context)
     feasible = [one for one in found.solutions if one.status == "feasible"]
     assert len(feasible) > 10
     for one in feasible:
@@ -151,31 +154,31 @@ def test_every_method_balances():
 
 
 def test_bounds_that_give_way_by_the_shortfall_hold_a_mechanism():
-    least = solve_mechanism_tensions("cable_arm")
+    least = solve_tensions("cable_arm")
     assert least.shortfall is None
     largest = float(np.max(least.tensions))
     limits = (0.6 * largest, 0.7 * largest)
-    found = solve_mechanism_tensions("cable_arm", limits=limits)
+    found = solve_tensions("cable_arm", limits=limits)
     assert found.status == "infeasible"
     beyond = found.as_dict()["infeasible_by"]["beyond_bounds_n"]
     for give, status in ((1.001, "feasible"), (0.999, "infeasible")):
         wider = (limits[0] - give * beyond, limits[1] + give * beyond)
-        assert solve_mechanism_tensions("cable_arm", limits=wider).status == status
+        assert solve_tensions("cable_arm", limits=wider).status == status
 
 
 def test_what_no_cable_acts_on_is_said():
-    found = solve_mechanism_tensions("arm_on_platform", held=[])
+    found = solve_tensions("arm_on_platform", held=[])
     assert found.status == "infeasible"
-    words = [words for words, _ in found.uncontrolled()]
+    words = [row["combination"] for row in found.uncontrolled()]
     assert words == [f"moment at {name}" for name in JOINTS]
     assert found.as_dict()["rank"] == 6
-    down = solve_mechanism_tensions("arm_on_platform", held=[], joints=dict.fromkeys(JOINTS, 0.0))
+    down = solve_tensions("arm_on_platform", held=[], joints=dict.fromkeys(JOINTS, 0.0))
     assert down.status == "feasible"
     with pytest.raises(TensionProblemError, match="accepted: quadratic_program"):
-        solve_mechanism_tensions("arm_on_platform", "closed_form", held=[])
+        solve_tensions("arm_on_platform", method="closed_form", held=[])
 
 
-HANG, SOLVE = hang_mechanism, solve_mechanism_tensions
+HANG, SOLVE = solve_static, solve_tensions
 
 
 @pytest.mark.parametrize(

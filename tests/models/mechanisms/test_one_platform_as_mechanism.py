@@ -6,12 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.front.mechanisms import (
-    hang_mechanism,
-    place_mechanism,
-    solve_mechanism_tensions,
-)
-from cdpr_drake.analyses.front.tensions import solve_tensions
+from cdpr_drake.analyses.mechanisms import place_mechanism
+from cdpr_drake.analyses.statics.static import solve_static
+from cdpr_drake.analyses.tensions import solve_tensions
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
@@ -90,7 +87,7 @@ def test_its_cables_are_the_same(name, tmp_path):
 def test_its_tensions_are_the_same(name, tmp_path):
     robot, path = load_robot(name), as_mechanism_file(load_robot(name), tmp_path)
     for method in ("quadratic_program", "closed_form"):
-        wanted, found = solve_tensions(robot, method=method), solve_mechanism_tensions(path, method)
+        wanted, found = (solve_tensions(form, method=method) for form in (robot, path))
         assert found.status == wanted.status == "feasible"
         np.testing.assert_allclose(found.tensions, wanted.tensions, rtol=SAME, atol=SAME)
 
@@ -98,7 +95,7 @@ def test_its_tensions_are_the_same(name, tmp_path):
 def test_it_stays_where_pulleys_are(tmp_path):
     robot = load_robot("caroca")
     path = as_mechanism_file(robot, tmp_path)
-    over, straight = hang_mechanism(path), hang_mechanism(path, pulleys=False)
+    over, straight = solve_static(path), solve_static(path, pulleys=False)
     assert np.min(np.abs(over.lengths - straight.lengths)) > 1e-3
     assert over.rest.residual < 1e-6 * robot.platform.mass * robot.gravity
     assert over.rest.stability == "stable"

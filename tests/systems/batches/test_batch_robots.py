@@ -10,7 +10,7 @@ import pytest
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.front.environments import environment_names, make_environment
+from cdpr_drake.analyses.environments import environment_names, make_environment
 from cdpr_drake.errors import CdprError, TensionProblemError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot

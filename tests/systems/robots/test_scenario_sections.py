@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.analyses.front.statics import solve_static
 from cdpr_drake.analyses.reporting.log_files import column_names
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.statics.static import solve_static
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import PlatformDamping

@@ -1,4 +1,4 @@
-"""A robot at rest, and the polygon of its feasible tensions, as pictures."""
+"""Tensions of each method as bars, and the polygon of feasible tensions, as pictures."""
 
 from __future__ import annotations
 
@@ -7,102 +7,16 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from scipy.spatial import ConvexHull, QhullError
 
-from cdpr_drake.analyses.statics.static_query import StaticReport
-from cdpr_drake.analyses.visualization.figure_style import (
-    bar_style,
-    bare_figure,
-    few_ticks,
-    line_style,
-    new_figure,
-    styled,
-)
+from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.errors import TensionProblemError
-from cdpr_drake.palette import BOUND, DOTTED, MARKERS, OUTLINE, PLATFORM, SOLID, look_of, nth_look
+from cdpr_drake.palette import BOUND, MARKERS, PLATFORM, SOLID, look_of
 from cdpr_drake.tensions.methods import METHODS, feasible_polygon, solution_space
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
 
-CURVE_POINTS = 40
-"""Points of a drawn cable."""
-
-FLAT = 0.2
-"""A view is at least so high beside its width, and the other way round."""
-
 Leaving = tuple[float, int, float]
 """Where a line leaves along an edge, number of its cable from 1, and its bound [N]."""
-
-
-def static_figure(report: StaticReport, title: str) -> Figure:
-    """The cables from the side and from above, tensions, and natural frequencies."""
-    vibrates = report.frequencies is not None
-    words = f"{title}\ncables in the world frame W, tensions" + ", vibrations" * vibrates
-    figure = bare_figure((12.0, 9.5), words)
-    mosaic: list[Any] = [["side", "above"], ["tensions", "modes" if vibrates else "tensions"]]
-    with styled():
-        axes = figure.subplot_mosaic(mosaic)
-    curves = cable_curves(report.cables, report.model, report.X_WP, report.l0, CURVE_POINTS)
-    anchors = report.X_WP.rotation().matrix() @ report.cables.p_PB
-    anchors = anchors + report.X_WP.translation()[:, np.newaxis]
-    for place, (i, j), words, view in (
-        (axes["side"], (0, 2), "xz", "from the side; dotted: slack"),
-        (axes["above"], (0, 1), "xy", "from above; dotted: slack"),
-    ):
-        for k, curve in enumerate(curves):
-            slack = report.slack[k]
-            look = nth_look(k)
-            dash = DOTTED if slack else SOLID
-            place.plot(curve[i], curve[j], linestyle=dash, color=look.color)
-            place.plot(
-                curve[i, 0], curve[j, 0], look.marker, color=look.color, label=report.names[k]
-            )
-        outline = _outline(anchors[[i, j]])
-        place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
-        place.set_title(view)
-        _not_flat(place)
-        place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
-    axes["above"].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-    place = axes["tensions"]
-    places = np.arange(len(report.l0))
-    for k, tension in enumerate(report.tensions):
-        place.bar(k, tension, **bar_style(nth_look(k)))
-    place.set_xticks(places, report.names)
-    place.set(ylabel="tension at the platform [N]")
-    low, high = report.bounds
-    for bound in (low, high):
-        if 0.0 < bound <= 2.0 * np.max(report.tensions, initial=1e-9):
-            place.axhline(bound, label=f"bound {bound:g} N", **line_style(BOUND))
-            place.legend(loc="upper right")
-            place.margins(y=0.3)  # above the bars
-    if report.frequencies is None:  # inextensible cables
-        return figure
-    place = axes["modes"]
-    places = np.arange(len(report.frequencies)) + 1
-    place.bar(places, report.frequencies, color=PLATFORM.color)
-    place.set(xlabel="mode [-]", ylabel="natural frequency [Hz]", xticks=places)
-    return figure
-
-
-def _not_flat(place: Any) -> None:
-    """Room across a flat robot, for the numbers on that axis."""
-    low, high = np.transpose([place.get_xlim(), place.get_ylim()])
-    half = 0.5 * np.maximum(high - low, FLAT * np.max(high - low))
-    middle = 0.5 * (low + high)
-    place.set_xlim(middle[0] - half[0], middle[0] + half[0])
-    place.set_ylim(middle[1] - half[1], middle[1] + half[1])
-    few_ticks(place.xaxis)
-    few_ticks(place.yaxis, 4)
-
-
-def _outline(points: Array) -> Array:
-    """Closed convex outline of points in a plane, shape (2, n); the points where there is none."""
-    try:
-        around = ConvexHull(points.T).vertices
-    except QhullError:
-        return points
-    return points[:, np.append(around, around[0])]
 
 
 def polygon_figure(
@@ -111,8 +25,8 @@ def polygon_figure(
     """The feasible polygon in the null space with a point for each solution.
 
     Args:
-        problem: What was asked.
-        solutions: Its solutions; those without tensions are left out.
+        problem: The problem.
+        solutions: Its solutions; solutions without tensions are left out.
         title: Title.
 
     Raises:
@@ -130,13 +44,13 @@ def polygon_figure(
     axes.plot(*closed, color=PLATFORM.color, linestyle=SOLID)
     solutions = [s for s in solutions if np.all(np.isfinite(s.tensions))]
     extent = float(np.max(np.ptp(vertices, axis=1)))
-    free = list(MARKERS)
+    markers = list(MARKERS)
     for eta, labels, filled in _places(solutions, N, extent):
-        # A method keeps its look in all polygons; where several meet, it is that of the first. In
-        # grey print two of more methods than symbols would be one.
+        # A method keeps its look in all polygons; where several meet, the first one's look holds.
+        # With more methods than markers some would look alike in grey print.
         look = look_of(labels[0].partition(" ")[0], list(METHODS))
-        marker = look.marker if look.marker in free or not free else free[0]
-        free = [one for one in free if one != marker]
+        marker = look.marker if look.marker in markers or not markers else markers[0]
+        markers = [other for other in markers if other != marker]
         axes.plot(
             *eta,
             marker,
@@ -150,8 +64,11 @@ def polygon_figure(
     room = 0.12 * max(float(np.max(high - low)), 1e-9)
     axes.set(xlim=(low[0] - room, high[0] + room), ylim=(low[1] - room, high[1] + room))
     _draw_bounds(axes, problem, t, N)
-    axes.set(xlabel=r"$\eta_1$ [N]", ylabel=r"$\eta_2$ [N]", aspect="equal")
-    axes.legend(loc="center left", bbox_to_anchor=(1.26, 0.5))
+    axes.set(
+        xlabel=r"$\eta_1$ [N], of tensions $t = t_0 + N \eta$ with $W N = 0$",
+        ylabel=r"$\eta_2$ [N]", aspect="equal",
+    )  # fmt: skip
+    figure.legend(loc="outside right center")  # one of the axes would be cut at their aspect
     return figure
 
 
@@ -174,9 +91,9 @@ def _places(
 
 
 def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None:
-    """The lines on which one tension is at a bound; where they leave, whose and which bound.
+    """Draws the lines on which a tension is at a bound, with the cable and the bound at their ends.
 
-    Words stand outside at the right and at the top, those of lines that leave together as one.
+    The words stand at the right and at the top; lines that leave together share theirs.
     """
     ends: dict[int, list[Leaving]] = {0: [], 1: []}
     for bounds, style in ((problem.lower, "-"), (problem.upper, "--")):
@@ -188,16 +105,17 @@ def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None
             right = abs(N[i, 1]) > abs(N[i, 0])  # it runs more along x than along y
             last = line[np.argmax(line[:, 0 if right else 1])]
             ends[0 if right else 1].append((float(last[1 if right else 0]), i + 1, float(bound)))
-    for across, found in ends.items():
+    for across, leaving in ends.items():
         low, high = axes.get_ylim() if across == 0 else axes.get_xlim()
-        for group in _near(sorted(found), (0.06, 0.24)[across] * (high - low)):
+        for group in _near(sorted(leaving), (0.06, 0.24)[across] * (high - low)):
             middle = (group[0][0] + group[-1][0]) / 2.0
             named: dict[float, list[int]] = {}
             for _, number, bound in group:
                 named.setdefault(bound, []).append(number)
             words = "\n".join(
-                f"cable{'s' * (len(some) > 1)} {', '.join(map(str, sorted(some)))} at {bound:g} N"
-                for bound, some in named.items()
+                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, sorted(numbers)))} at "
+                f"{bound:g} N"
+                for bound, numbers in named.items()
             )
             place = (1.01, (middle - low) / (high - low))
             axes.text(
