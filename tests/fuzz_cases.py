@@ -395,7 +395,6 @@ COMMANDS: list[list[str]] = [
     ["study", "control-stability", "--quick", "--json", "--out", "new"],
     ["robots", "--json"],
     ["view", "acrobot_small", "--html", "page.html"],
-    ["bench", "tension", "--quick", "--json"],
     ["doctor", "--json"],
 ]  # fmt: skip
 

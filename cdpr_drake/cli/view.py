@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from cdpr_drake.analyses.frame.files import write_files
 from cdpr_drake.analyses.visualization.mechanism_picture import (
     MechanismPicture,
     mechanism_picture,
@@ -16,7 +17,6 @@ from cdpr_drake.analyses.visualization.mechanism_picture import (
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.visualization.replay import RobotPicture, robot_picture
 from cdpr_drake.cli.options import LISTENING, Host, Port, RobotName, named_options
-from cdpr_drake.cli.robot_folder import write_files
 from cdpr_drake.cli.terminal import message_console, print_words, working
 from cdpr_drake.errors import CdprError, OutputFolderError, plain_words
 from cdpr_drake.models.mechanism_loader import load_robot_or_mechanism

@@ -5,9 +5,8 @@ import re
 import subprocess
 import sys
 from functools import cache
-from importlib import import_module
 from pathlib import Path
-from typing import Annotated, get_origin, get_type_hints
+from pkgutil import resolve_name
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,6 +14,7 @@ import pytest
 
 from cdpr_drake.analyses.installation import LISTED, compilation_steps
 from cdpr_drake.analyses.visualization.robot_gallery import thumbnail
+from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.kernel_cache.kernel_list import group_names
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -30,15 +30,18 @@ def test_the_package_is_a_command():
     assert re.match(r"cdpr_drake .*, Drake 1\.", done.stdout)
 
 
-@pytest.mark.parametrize("command", ["simulate", "static", "tension", "study", "stability"])
-def test_help_has_units(capsys, monkeypatch, command):
-    monkeypatch.setenv("COLUMNS", "200")
-    _, said, _ = run(capsys, command, "--help")
-    function = getattr(import_module(f"cdpr_drake.cli.{command}"), command)
-    hints = get_type_hints(function, None, None, True).values()
-    helps = [hint.__metadata__[0].help for hint in hints if get_origin(hint) is Annotated]
-    for unit in (unit for words in helps for unit in re.findall(r"\[.+?\]", words)):
-        assert unit in said
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_units_and_examples(capsys, monkeypatch, command):
+    """The words of each argument reach the terminal as they stand in the verb's docstring."""
+    monkeypatch.setenv("COLUMNS", "250")
+    code, said, _ = run(capsys, command, "--help")
+    words = " ".join(resolve_name(COMMANDS[command].verb).__doc__.partition("Raises:")[0].split())
+    assert code == 0
+    assert COMMANDS[command].line == words[: len(COMMANDS[command].line)]
+    assert set(re.findall(r"\[[^]\[]+?\]", words.rpartition("Args:")[2])) <= set(
+        re.findall(r"\[[^]\[]+?\]", " ".join(said.replace("│", " ").split()))
+    )
+    assert all(example in " ".join(said.split()) for example in COMMANDS[command].examples)
 
 
 def test_units_reach_the_terminal(capsys):
@@ -52,8 +55,7 @@ def test_units_reach_the_terminal(capsys):
 def test_an_infeasible_tension_is_an_answer(capsys):
     found = told(capsys, "tension", "acrobot_small", "--pose", "0.5,0.5,1.1")
     assert found["status"] == "infeasible"
-    words = " ".join(run(capsys, "tension", "--help")[1].split())
-    assert "The exit code is 0 for every answer" in words
+    assert "Every answer has exit code 0" in " ".join(run(capsys, "tension", "--help")[1].split())
 
 
 def test_view_writes_a_page(capsys, here):
@@ -67,7 +69,7 @@ def test_view_writes_a_page(capsys, here):
 
 
 def test_scenarios_lists_all(capsys, monkeypatch):
-    monkeypatch.setattr("cdpr_drake.cli.scenarios.load_scenario", cache(load_scenario))
+    monkeypatch.setattr("cdpr_drake.systems.diagrams.load.load_scenario", cache(load_scenario))
     facts = {fact["name"]: fact for fact in told(capsys, "scenarios")}
     assert list(facts) == list(scenario_names())
     assert facts["acrobot_ibvs"]["scheme"] == "ibvs"
@@ -85,7 +87,7 @@ def every_robot():
 @pytest.fixture
 def library(monkeypatch, every_robot):
     """The files are read once."""
-    monkeypatch.setattr("cdpr_drake.cli.robots.load_robot", every_robot.get)
+    monkeypatch.setattr("cdpr_drake.analyses.catalogues.load_robot", every_robot.get)
 
 
 def test_robots_lists_all(capsys, library):
@@ -160,8 +162,8 @@ def test_the_doctor_finds_nothing(capsys):
 def test_the_doctor_compiles_step_by_step(capsys, monkeypatch):
     done = []
     steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
-    for module in ("analyses.installation", "cli.doctor"):
-        monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.default_workers", lambda: 1)
     monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
     found = told(capsys, "doctor", "--compile")
     assert done == [group_names(), "one", "two"]
@@ -178,13 +180,6 @@ def test_steps_of_compilation_are_all_scenarios_and_both_engines_of_the_default(
     assert names[1] == "acrobot_pbvs"
     dict(compilation_steps())["tension methods"]()
     dict(compilation_steps())["acrobot_pbvs"]()
-
-
-def test_bench(capsys, monkeypatch):
-    names = [row["name"] for row in told(capsys, "bench", "tension", "--quick")["tension"]]
-    assert "exact QP, one call" in names
-    monkeypatch.setattr("cdpr_drake.cli.bench.BENCH_GROUPS", {})  # as in a wheel
-    assert "source checkout" in refuse(capsys, "bench", "tension")
 
 
 def test_options_of_imported_logs_that_change_nothing_are_told(capsys, here):

@@ -231,7 +231,7 @@ def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
         ('["workspace", "/etc/hostname"]', False),
         ('["workspace", "acrobot_small", "--obstacles=../secret.yaml"]', False),
         ('["workspace", "acrobot_small", "--certify=yes"]', False),
-        ('["study", "case-9", "--scheduler=tcp://somewhere:1"]', False),
+        ('["study", "case-9", "--runs-from=/etc"]', False),
         ('["study", "case-9", "--out=/tmp"]', False),
         ('["simulate", "acrobot_pbvs"]', False),
         ('["study"]', False), ("{}", False), ("[1]", False), ("[", False),
