@@ -26,8 +26,8 @@ from cyclopts import (
     convert,
 )
 
-from cdpr_drake.cli.commands import COMMANDS
-from cdpr_drake.cli.option_names import named_options
+from cdpr_drake.cli.commands import COMMANDS, Command
+from cdpr_drake.cli.option_names import named_options, with_options
 from cdpr_drake.cli.process import INCOMPLETE
 from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.schema.input_files import inputs_read_once
@@ -40,6 +40,13 @@ PICTURES = ("png", "pdf", "svg", "jpg", "jpeg", "tif", "tiff", "webp", "eps", "p
 
 KINDS = {int: "a whole number", float: "a number", bool: "true or false"}
 """What words of an option have to be, by the type of its argument."""
+
+LOADERS = {
+    "cdpr_drake.models.load_robot": "a command that takes one, such as cdpr tension or cdpr view",
+    "cdpr_drake.models.load_mechanism": "a command that takes one, such as cdpr static",
+    "cdpr_drake.systems.load_scenario": "a command that takes one, such as cdpr simulate",
+}  # fmt: skip
+"""Commands in the place of functions that messages name for files of another kind."""
 
 COMPLETION = "completion"
 """The subcommand that lets the Tab key complete."""
@@ -61,9 +68,17 @@ def make_app(given: Sequence[str]) -> App:
     for name, command in COMMANDS.items():
         words = {} if name == asked else {"help": command.line}
         examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
-        app.command(command.verb, name=name, help_epilogue=examples, **words)
+        for option in command.instead:
+            examples += f"\n\nAnother question: `cdpr {name} --{option}`, with `--help` for more"
+        app.command(_verb_of(command, given), name=name, help_epilogue=examples, **words)
     app.register_install_completion_command(name=COMPLETION)
     return app
+
+
+def _verb_of(command: Command, given: Sequence[str]) -> str:
+    """Module and function that answer a command line."""
+    options = {word.partition("=")[0].removeprefix("--") for word in given if word[:2] == "--"}
+    return next((verb for name, verb in command.instead.items() if name in options), command.verb)
 
 
 def _usual_parameter() -> Parameter:
@@ -141,7 +156,9 @@ def parsed(given: Sequence[str]) -> Call | None:
         words = f"found {name!r}; {accepted_names(name, COMMANDS)}" if name else "found none"
         raise CdprError(f"command: {words}; see cdpr --help")
     app = make_app(given)
-    options = {} if name == COMPLETION else options_of(resolve_name(COMMANDS[name].verb))
+    options = dict(LOADERS)
+    if name != COMPLETION:
+        options |= options_of(resolve_name(_verb_of(COMMANDS[name], given)))
 
     @app.meta.default
     def meta(
@@ -207,15 +224,15 @@ def run(given: Sequence[str], imported: Callable[[], None]) -> int:
             _save(result.plot(figure or None), path)
     if result is None or isinstance(result, int):
         return result or 0
-    return _show(result, call.json)
+    return _show(result, call)
 
 
-def _show(result: Any, json: bool) -> int:
+def _show(result: Any, call: Call) -> int:
     """Prints a result, and on stderr what is missing; returns the exit code."""
     from cdpr_drake.cli.terminal import message_console, wide_console
 
     console = message_console()
-    if json:
+    if call.json:
         print(js.dumps(result.as_dict(), indent=2))
     else:
         result.show(wide_console())
@@ -223,7 +240,7 @@ def _show(result: Any, json: bool) -> int:
     for file, why in failed.items():
         console.print(f"cdpr: {file}: not written: {why}")
     for line in result.notes():
-        console.print(line)
+        console.print(with_options(line, call.options))
     return result.exit_code or (INCOMPLETE if failed else 0)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 
@@ -13,12 +15,14 @@ class Command(NamedTuple):
         verb: Module and function that answers it.
         line: First line of the function's docstring, so that the help imports no verb.
         examples: Lines to try or to change.
+        instead: Other verbs by the options with which they are called instead.
     """
 
     group: str
     verb: str
     line: str
     examples: tuple[str, ...]
+    instead: Mapping[str, str] = MappingProxyType({})
 
 
 FIRST_STEPS = {

@@ -20,7 +20,7 @@ SHARED_OPTIONS = {
 """Options by the arguments that mean the same in every command; of `workers` the library refuses
 addresses of schedulers alone."""
 
-BEFORE = ("allow", "found", "leave out", "needs", "use", "with", "without")
+BEFORE = ("add", "allow", "found", "leave out", "needs", "use", "with", "without")
 """Words of a message after which an argument is named."""
 
 

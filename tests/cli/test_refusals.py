@@ -55,6 +55,7 @@ REFUSED = {
     "simulate": [
         ("foo", "scenario 'foo' is unknown", "acrobot_against_wind", "planar_pbvs"),
         ("nothing.yaml", "nothing.yaml", "no such scenario file"),
+        ("hung.yaml", "found a robot; use a command that takes one, such as cdpr tension"),
         ("bad.yaml", "bad.yaml:3: does not parse as YAML"),
         ("empty", "without scenario.yaml"),
         ("./acrobot_pbvs", "without scenario.yaml"),
@@ -77,7 +78,7 @@ REFUSED = {
         ("--duration soon", "--duration"),
         ("--seed 1.5", "--seed"),
         ("--out file", "found a file"),
-        ("--out full", "holds files already", "--overwrite"),
+        ("--out full", "holds files already", "or add --overwrite"),
         ("--out file/below", "cannot be written"),
         ("--nonsense", "--nonsense"),
         (f"{QUICK} --port 7000", "--port: found alone; accepted: with --meshcat"),

@@ -4,14 +4,15 @@ import ast
 import inspect
 import json
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import get_args, get_type_hints
 
 import pytest
 from matplotlib.figure import Figure
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
-from cdpr_drake.summaries import MOST_LINES
+from cdpr_drake.summaries import MOST_LINES, Summarized
 
 STUB = Path(cdpr.__file__).with_suffix(".pyi")
 HOMES = {
@@ -21,11 +22,16 @@ HOMES = {
 
 
 def shows_itself(result):
-    """In a few lines, as text and as HTML; what a verb returned also for JSON, and as a figure."""
+    """As text and as HTML; what a verb returned also for JSON, and as a figure."""
     if type(result) in RESULTS:
         assert as_json(result)
         assert isinstance(result.plot(), Figure)
     lines = repr(result).splitlines()
+    if isinstance(result, Result):
+        rows = sum(len(table.rows) for table in result.tables())
+        assert result._repr_html_().count("<tr>") >= rows
+        assert " object at 0x" not in repr(result)
+        return repr(result)
     assert 2 <= len(lines) <= MOST_LINES
     assert " object at 0x" not in repr(result)
     assert result._repr_html_().count("<tr>") >= len(lines) - 1
@@ -33,10 +39,14 @@ def shows_itself(result):
 
 
 def verbs():
-    """Functions of the front door that answer, by name."""
-    homes = {name: home for name, home in HOMES.items() if home.startswith("analyses.front.")}
-    homes.pop("plot")  # it draws, and answers nothing
-    return {n: getattr(cdpr, n) for n in homes if inspect.isfunction(getattr(cdpr, n))}
+    """Functions of the front door that answer, by name; `plot` only draws."""
+    homes = {
+        name: home
+        for name, home in HOMES.items()
+        if home.startswith("analyses.") and "studies" not in home
+    }
+    names = homes.keys() - {"plot"}
+    return {n: getattr(cdpr, n) for n in names if inspect.isfunction(getattr(cdpr, n))}
 
 
 def result_classes():
@@ -45,7 +55,7 @@ def result_classes():
     for verb in verbs().values():
         told = get_type_hints(verb)["return"]
         found |= {one for one in (get_args(told) or (told,)) if inspect.isclass(one)}
-    return found - {tuple, str, Any}
+    return {kind for kind in found if issubclass(kind, Summarized | Result)}
 
 
 RESULTS = result_classes()
