@@ -71,9 +71,9 @@ class CheckedFiles(Result):
     def as_dict(self) -> list[dict[str, Any]]:
         """A list, an entry each."""
         return [
-            {"file": one.file, "kind": one.kind, "problems": list(one.problems),
-             "notes": list(one.notes)}
-            for one in self.files
+            {"file": file.file, "kind": file.kind, "problems": list(file.problems),
+             "notes": list(file.notes)}
+            for file in self.files
         ]  # fmt: skip
 
     def tables(self) -> list[Table]:
@@ -83,9 +83,9 @@ class CheckedFiles(Result):
     def lines(self) -> list[str]:
         """Problems and notes."""
         lines: list[str] = []
-        for one in self.files:
-            lines += one.problems or [f"{one.file}: valid {one.kind}"]
-            lines += [f"  note: {note}" for note in one.notes]
+        for file in self.files:
+            lines += file.problems or [f"{file.file}: valid {file.kind}"]
+            lines += [f"  note: {note}" for note in file.notes]
         return lines
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
@@ -96,7 +96,7 @@ class CheckedFiles(Result):
     @property
     def exit_code(self) -> int:
         """2 if something is wrong."""
-        return WRONG if any(one.problems for one in self.files) else 0
+        return WRONG if any(file.problems for file in self.files) else 0
 
 
 @verb()

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
@@ -176,8 +176,8 @@ class Examination(Result):
     def tables(self) -> list[Table]:
         """A row for each check."""
         rows = [
-            (one.check, "ok" if one.passed else "missing", one.found, one.remedy)
-            for one in self.findings
+            (finding.check, "ok" if finding.passed else "missing", finding.found, finding.remedy)
+            for finding in self.findings
         ]
         return [Table("cdpr doctor", ("check", "", "found", "remedy"), rows)]
 
@@ -227,9 +227,9 @@ def examine_installation(
         StoppedError: It was stopped; what is compiled is kept.
     """
     if not compile_all:
+        findings = (check() for check in CHECKS)
         return Examination([
-            Finding(one.check, one.passed, one.found, "" if one.passed else one.remedy)
-            for one in (check() for check in CHECKS)
+            replace(finding, remedy="") if finding.passed else finding for finding in findings
         ])  # fmt: skip
     names, began = [LISTED, *(name for name, _ in compilation_steps())], time.perf_counter()
     count = Count(follow, len(names), unit="steps")

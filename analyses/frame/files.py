@@ -69,10 +69,10 @@ def write_files(folder: Path, files: dict[str, str], overwrite: bool) -> list[Pa
     """
     check_no_file(folder)
     paths = [folder / name for name in files]
-    there = [str(path) for path in paths if path.exists()]
-    if there and not overwrite:
+    existing = [str(path) for path in paths if path.exists()]
+    if existing and not overwrite:
         raise OutputFolderError(
-            f"out: found {', '.join(there)}; accepted: a folder without, or add --overwrite"
+            f"out: found {', '.join(existing)}; accepted: a folder without, or add --overwrite"
         )
     parts: list[Path] = []
     try:
@@ -106,8 +106,10 @@ def copy_new(contents: dict[str, bytes], folder: Path) -> list[str]:
             written; or one cannot be written, and none is left.
     """
     check_no_file(folder)
-    there = [name for name in contents if (folder / name).exists() or (folder / name).is_symlink()]
-    changed = [name for name in there if not _holds(folder / name, contents[name])]
+    existing = [
+        name for name in contents if (folder / name).exists() or (folder / name).is_symlink()
+    ]
+    changed = [name for name in existing if not _holds(folder / name, contents[name])]
     if changed:
         raise OutputFolderError(
             f"{folder}: found {', '.join(changed)} with other content, which is never "
@@ -117,7 +119,7 @@ def copy_new(contents: dict[str, bytes], folder: Path) -> list[str]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name in contents:
-            if name not in there:
+            if name not in existing:
                 with (folder / name).open("xb") as file:
                     written.append(name)
                     file.write(contents[name])

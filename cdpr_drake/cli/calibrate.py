@@ -22,7 +22,7 @@ from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
 from cdpr_drake.analyses.front.simulated_fits import POSES, calibrate_in_simulation
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.cli.calibrate_camera import whole_pair
-from cdpr_drake.cli.log_options import check_campaign, results_below_runs, robot_and_log, told_fit
+from cdpr_drake.cli.log_options import check_campaign, fit_answer, results_below_runs, robot_and_log
 from cdpr_drake.cli.option_names import named_options
 from cdpr_drake.cli.sessions import Answer, fit_session, refuse
 from cdpr_drake.models.robot_loader import load_robot
@@ -114,20 +114,20 @@ def calibrate(
         formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
     """
     values = dict(locals())
-    kept: dict[str, Any] = {"propose": propose, "overwrite": overwrite, "formats": formats}
+    output: dict[str, Any] = {"propose": propose, "overwrite": overwrite, "formats": formats}
     of_campaign = ("campaign", "poses", "poses_from")
     if campaign is not None:
         check_campaign(robot, log)
         refuse(calibrate, values, "with --campaign; accepted: with a log",
-               accepted=("out", *kept, *of_campaign))  # fmt: skip
+               accepted=("out", *output, *of_campaign))  # fmt: skip
         scenario = load_scenario(campaign)
         folder = results_below_runs(out, f"campaign-{scenario.name}")
         session = fit_session(folder)
         with named_options({"scenario": "--campaign"}):
             simulated = calibrate_in_simulation(
-                scenario, poses_from or poses, folder=folder, session=session, **kept
+                scenario, poses_from or poses, folder=folder, session=session, **output
             )
-        return told_fit(simulated, session)
+        return fit_answer(simulated, session)
     refuse(calibrate, values, "without --campaign; accepted: with it", names=of_campaign)
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name, "cdpr calibrate")
@@ -138,9 +138,9 @@ def calibrate(
         tracker_late=tracker_late, folder=folder, session=session, priors=priors or {},
         mount=mount, image_size=image_size, start=start, rest=rest, outliers=not keep_outliers,
         zero=loaded.home.transform() if zero == HOME else zero, hold_out=hold_out,
-        bounds=bounds or {}, **kept,
+        bounds=bounds or {}, **output,
     )  # fmt: skip
-    return told_fit(calibration, session)
+    return fit_answer(calibration, session)
 
 
 _SIGMAS = ", ".join(

@@ -57,27 +57,29 @@ COMPLETE = "__complete"
 SHARED = Group("Of all commands", sort_key=100)
 
 
-def make_app(given: Sequence[str]) -> App:
+def make_app(command_line: Sequence[str]) -> App:
     """The command. Of subcommands that are not asked for, the help has the first line only."""
-    asked = next((word for word in given if not word.startswith("-")), "")
+    command_name = next((word for word in command_line if not word.startswith("-")), "")
     app = App(
         name="cdpr", help="Cable-driven parallel robots in Drake.", version_flags=(),
         help_format="markdown", help_flags=("--help",),
         default_parameter=_usual_parameter(),
     )  # fmt: skip
     for name, command in COMMANDS.items():
-        words = {} if name == asked else {"help": command.line}
+        words = {} if name == command_name else {"help": command.line}
         examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
         for option in command.instead:
             examples += f"\n\nAnother question: `cdpr {name} --{option}`, with `--help` for more"
-        app.command(_verb_of(command, given), name=name, help_epilogue=examples, **words)
+        app.command(_verb_of(command, command_line), name=name, help_epilogue=examples, **words)
     app.register_install_completion_command(name=COMPLETION)
     return app
 
 
-def _verb_of(command: Command, given: Sequence[str]) -> str:
+def _verb_of(command: Command, command_line: Sequence[str]) -> str:
     """Module and function that answer a command line."""
-    options = {word.partition("=")[0].removeprefix("--") for word in given if word[:2] == "--"}
+    options = {
+        word.partition("=")[0].removeprefix("--") for word in command_line if word[:2] == "--"
+    }
     return next((verb for name, verb in command.instead.items() if name in options), command.verb)
 
 
@@ -109,10 +111,10 @@ def _default_words(value: object) -> str | None:
     return None if value in (None, False, "") else str(value)
 
 
-def _joined(given: Sequence[str]) -> list[str]:
+def _joined(command_line: Sequence[str]) -> list[str]:
     """Words of a command line in which a negative number belongs to the option before it."""
     words: list[str] = []
-    for word in given:
+    for word in command_line:
         if re.match(r"-([\d.]|$)", word) and words and re.fullmatch(r"--[a-z-]+", words[-1]):
             words[-1] += f"={word}"
         else:
@@ -142,23 +144,23 @@ class Call(NamedTuple):
     figures: Mapping[str, Path]
 
 
-def parsed(given: Sequence[str]) -> Call | None:
+def parsed(command_line: Sequence[str]) -> Call | None:
     """Reads a command line; None if that was a question for help or completion, now answered.
 
     Raises:
         CdprError: Words are not accepted; options are named as they are written.
     """
-    name = next((word for word in given if not word.startswith("-")), "")
+    name = next((word for word in command_line if not word.startswith("-")), "")
     if name == COMPLETE:
-        make_app(given[1:])(given, result_action="return_value")
+        make_app(command_line[1:])(command_line, result_action="return_value")
         return None
     if name not in (*COMMANDS, COMPLETION):
         words = f"found {name!r}; {accepted_names(name, COMMANDS)}" if name else "found none"
         raise CdprError(f"command: {words}; see cdpr --help")
-    app = make_app(given)
+    app = make_app(command_line)
     options = dict(LOADERS)
     if name != COMPLETION:
-        options |= options_of(resolve_name(_verb_of(COMMANDS[name], given)))
+        options |= options_of(resolve_name(_verb_of(COMMANDS[name], command_line)))
 
     @app.meta.default
     def meta(
@@ -185,19 +187,19 @@ def parsed(given: Sequence[str]) -> Call | None:
     try:
         with named_options(options):
             call = app.meta(
-                _joined(given), result_action="return_value", exit_on_error=False,
+                _joined(command_line), result_action="return_value", exit_on_error=False,
                 print_error=False,
             )  # fmt: skip
     except CycloptsError as problem:
-        raise CdprError(_usage_words(problem, given)) from problem
+        raise CdprError(_usage_words(problem, command_line)) from problem
     return call if isinstance(call, Call) else None
 
 
-def run(given: Sequence[str], imported: Callable[[], None]) -> int:
+def run(command_line: Sequence[str], imported: Callable[[], None]) -> int:
     """Runs a subcommand.
 
     Args:
-        given: The command line.
+        command_line: The command line.
         imported: Called when all that the subcommand needs is imported.
 
     Returns:
@@ -207,7 +209,7 @@ def run(given: Sequence[str], imported: Callable[[], None]) -> int:
         CdprError: As `parsed`, or as the verb.
         StoppedError: The work was stopped.
     """
-    call = parsed(given)
+    call = parsed(command_line)
     imported()
     if call is None:
         return 0
@@ -278,9 +280,9 @@ def _save(figure: Any, path: Path) -> None:
     save_figure(figure, path)
 
 
-def _usage_words(problem: CycloptsError, given: Sequence[str]) -> str:
+def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
     """What is wrong with a command line, in one line with the value found and what is accepted."""
-    name = next((word for word in given if word in COMMANDS), "")
+    name = next((word for word in command_line if word in COMMANDS), "")
     words = " ".join(str(problem).split()).rstrip(".")
     token = getattr(problem, "token", None)
     if isinstance(problem, CoercionError) and token is not None and problem.argument is not None:

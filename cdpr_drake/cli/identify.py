@@ -20,7 +20,7 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.front.calibration import identify as run_identification
 from cdpr_drake.analyses.front.free_motion import identify_free_motion
 from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
-from cdpr_drake.cli.log_options import check_campaign, results_below_runs, robot_and_log, told_fit
+from cdpr_drake.cli.log_options import check_campaign, fit_answer, results_below_runs, robot_and_log
 from cdpr_drake.cli.option_names import named_options
 from cdpr_drake.cli.sessions import Answer, fit_session, refuse
 from cdpr_drake.identification.parameters import GROUPS
@@ -115,20 +115,20 @@ def identify(
         formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
     """
     values = dict(locals())
-    kept: dict[str, Any] = {"overwrite": overwrite, "formats": formats}
+    output: dict[str, Any] = {"overwrite": overwrite, "formats": formats}
     if campaign is not None:
         check_campaign(robot, log)
         refuse(identify, values, "with --campaign; accepted: with a log",
-               accepted=("campaign", "unknown", "out", *kept))  # fmt: skip
+               accepted=("campaign", "unknown", "out", *output))  # fmt: skip
         scenario = load_scenario(campaign)
         folder = results_below_runs(out, f"identify-{scenario.name}")
         session = fit_session(folder)
         with named_options({"scenario": "--campaign"}):
             simulated = identify_in_simulation(
                 scenario, CAMPAIGN_UNKNOWN if unknown is None else unknown, folder=folder,
-                session=session, **kept,
+                session=session, **output,
             )  # fmt: skip
-        return told_fit(simulated, session)
+        return fit_answer(simulated, session)
     name, file = robot_and_log("identify", robot, log)
     loaded = load_robot(name, "cdpr identify")
     folder = results_below_runs(out, f"identify-{loaded.name}")
@@ -137,21 +137,21 @@ def identify(
     if free is not None:
         refuse(identify, values, "with --free; accepted: without it",
                accepted=("robot", "log", "free", "unknown", "priors", "out", *of_swing,
-                         *kept))  # fmt: skip
+                         *output))  # fmt: skip
         swing = identify_free_motion(
             loaded, file, unknown, stretches=free, held_out=hold_out or (), lead=lead,
             folder=folder, start=start, sigmas=sigmas or {}, priors=priors or {},
-            tracker=tracker_frame, session=session, **kept,
+            tracker=tracker_frame, session=session, **output,
         )  # fmt: skip
-        return told_fit(swing, session)
+        return fit_answer(swing, session)
     refuse(identify, values, "without --free; accepted: with it", names=of_swing)
     identification = run_identification(
         loaded, file, UNKNOWN if unknown is None else unknown, validate=validate,
         tracker_late=tracker_late, folder=folder, session=session, common=common,
         priors=priors or {}, bandwidth=bandwidth, sigma_lengths=sigma_lengths, pulleys=pulleys,
-        outliers=not keep_outliers, **kept,
+        outliers=not keep_outliers, **output,
     )  # fmt: skip
-    return told_fit(identification, session)
+    return fit_answer(identification, session)
 
 
 identify.__doc__ = (

@@ -93,7 +93,7 @@ def results_below_runs(out: Path | None, name: str) -> Path:
     return out if out is not None else free_folder(Path("runs") / name)
 
 
-def told_fit(fit: FittedRobot, session: FollowedSession) -> Answer:
+def fit_answer(fit: FittedRobot, session: FollowedSession) -> Answer:
     """Tables of a fit and where the results are; `MISFIT` if it does not fit what was measured."""
     folder = shown_path(fit.folder or Path())
     missing = [f"The data is complete in {folder}"] if fit.failed else []

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.cli.process import CLIENT_ENDED
 from cdpr_drake.cli.sessions import Answer
-from cdpr_drake.cli.simulate import RunSession, told_run
+from cdpr_drake.cli.simulate import RunSession, run_answer
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -90,7 +90,7 @@ def serve(
             run = simulate(
                 loaded, folder=folder, overwrite=overwrite, formats=formats, session=session
             )
-        return told_run(run, session)
+        return run_answer(run, session, duration)
     except ClientEndedError as problem:  # before the first step
         follow.say(f"cdpr: {problem}; nothing was simulated")
         return CLIENT_ENDED

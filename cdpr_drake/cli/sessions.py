@@ -156,7 +156,7 @@ class Answer(Result):
 
     def lines(self) -> Sequence[str]:
         """Words among what is printed."""
-        return [one for one in self.printed if isinstance(one, str)]
+        return [item for item in self.printed if isinstance(item, str)]
 
     def notes(self) -> Sequence[str]:
         """On what was missing or stopped."""
@@ -173,8 +173,8 @@ class Answer(Result):
 
     def show(self, console: Any) -> None:
         """Prints tables and words in their order."""
-        for one in self.printed:
-            console.print(one, soft_wrap=isinstance(one, str), highlight=False)
+        for item in self.printed:
+            console.print(item, soft_wrap=isinstance(item, str), highlight=False)
 
 
 def failures(failed: Mapping[str, str], folder: Path | None) -> dict[str, str]:

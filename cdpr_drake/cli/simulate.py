@@ -147,7 +147,7 @@ def simulate(
                 "formats": formats, "log_formats": log_formats, "video": video, "session": session,
             }  # fmt: skip
             if resume is not None:
-                return told_run(continue_run(resume, **left), session)
+                return run_answer(continue_run(resume, **left), session)
             assert finish is not None
             return _finished(finish_run(finish, **left), session)
         of_break = ("time", "after", "reactions")
@@ -178,7 +178,7 @@ def simulate(
             loaded, folder=folder, overwrite=overwrite, formats=formats, log_formats=log_formats,
             video=video, session=session,
         )  # fmt: skip
-        return told_run(run, session)
+        return run_answer(run, session, duration)
 
 
 def _check_options(scenario: str, values: Mapping[str, Any]) -> None:
@@ -241,9 +241,9 @@ class RunSession(FollowedSession):
         return None if kind.live is None else kind.live(scenario, meshcat)
 
 
-def told_run(run: Run, session: FollowedSession) -> Answer:
-    """What a run did, with the exit code."""
-    answer, result = _finished(run, session), run.result
+def run_answer(run: Run, session: FollowedSession, duration: float | None = None) -> Answer:
+    """What a run did, with the exit code; `duration` is what was asked for [s]."""
+    answer, result = _finished(run, session, duration), run.result
     where = f"{result.sim_time:g} s of simulated time"
     folder = _shown(run.folder)
     if result.outcome == Outcome.INTERRUPTED:
@@ -256,10 +256,13 @@ def told_run(run: Run, session: FollowedSession) -> Answer:
     return answer
 
 
-def _finished(run: Run, session: FollowedSession) -> Answer:
+def _finished(run: Run, session: FollowedSession, duration: float | None = None) -> Answer:
     """What results of a run were written."""
     summary, folder = run.numbers, _shown(run.folder)
-    table = Table(title=f"{summary['scenario']}: {summary['outcome']}", show_header=False)
+    end = summary["outcome"]
+    if duration is not None and run.result.outcome == Outcome.TIMEOUT:
+        end = f"ended at {summary['sim_time_s']:g} s, as asked"
+    table = Table(title=f"{summary['scenario']}: {end}", show_header=False)
     factor = summary["realtime_factor"] or 0.0
     table.add_row("simulated", f"{summary['sim_time_s']:.2f} s, {factor:.1f} x real time")
     table.add_row("cables", summary["geometry"])

@@ -190,6 +190,11 @@ def test_ctrl_c_keeps_what_was_simulated(capsys, here, monkeypatch):
 
 
 @pytest.mark.usefixtures("without_pictures")
+def test_the_end_of_a_duration_that_was_asked_for_is_no_timeout(capsys, here, without_pictures):
+    words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--out", "o", "--duration", "0.1")
+    assert "acrobot_pbvs: ended at 0.1 s, as asked" in run(capsys, *words)[1]
+
+
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
     words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.6", *COMPILED)
     code, out, _ = run(capsys, *words, "--out", "out")
