@@ -1,9 +1,4 @@
-"""The installation on this machine: whether it has what is needed, and kernels compiled beforehand.
-
-`examine` looks for what cdpr_drake needs, and says the remedy where something is missing or does
-not work. `compilation_steps` and `compile_step` compile at once what the first simulation, the
-first tension query and others would wait for.
-"""
+"""The installation on this machine: what it has and lacks, and kernels compiled beforehand."""
 
 from __future__ import annotations
 
@@ -11,14 +6,22 @@ import gc
 import importlib
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated, Any
 
-from cdpr_drake.errors import CdprError
+from cyclopts import Parameter
+
+from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
+from cdpr_drake.analyses.frame.jobs import default_workers, finished_jobs
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.reporting.provenance import browser
+from cdpr_drake.errors import CdprError, StoppedError
 from cdpr_drake.kernel_cache.background import compile_needed
-from cdpr_drake.kernel_cache.kernel_list import group_names
+from cdpr_drake.kernel_cache.kernel_list import group_names, missing_kernels, needed_kernels
 from cdpr_drake.models.rendered_camera import check_rendering
 
 RENDER_TIMEOUT = 120.0
@@ -70,12 +73,36 @@ def _package(name: str, module: str) -> Finding:
         return Finding(name, False, str(problem), remedy)
 
 
+EXTRAS = {
+    "gymnasium": ("gym", "learning environments"), "nicegui": ("studio", "cdpr studio"),
+    "pyzmq": ("bridge", "cdpr serve"), "distributed": ("cluster", "Dask clusters"),
+    "cmaes": ("design", "cdpr design"), "pyarrow": ("parquet", "logs as parquet"),
+    "mcap": ("mcap", "logs of MCAP"), "trimesh": ("mesh", "meshes of obstacles"),
+    "mujoco": ("mjcf", "files of MuJoCo"),
+}  # fmt: skip
+"""Packages that one part needs and the rest does without: their extra, and that part."""
+
+
 def _extra(name: str, extra: str, serves: str) -> Finding:
-    """A package that one part needs and the rest does without: it is no fault that it is absent."""
+    """It is no fault that it is absent."""
     try:
         return Finding(name, True, version(name))
     except PackageNotFoundError:
-        return Finding(name, True, f"absent; {serves} need it: pip install 'cdpr_drake[{extra}]'")
+        remedy = f"pip install 'cdpr_drake[{extra}]'"
+        return Finding(name, True, f"absent; for {serves}: {remedy}")
+
+
+def _kernels() -> Finding:
+    missing, needed = missing_kernels(group_names()), len(needed_kernels(group_names()))
+    words = f"{needed - missing} of {needed} are compiled"
+    if missing:
+        words += "; the others are at their first use, or by cdpr doctor --compile"
+    return Finding("compiled kernels", True, words)
+
+
+def _browser() -> Finding:
+    absent = "absent; for cdpr reproduce --pdf: install chromium"
+    return Finding("browser", True, browser() or absent)
 
 
 def _aruco() -> Finding:
@@ -123,19 +150,96 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
     lambda: _package("numba", "numba"),
     lambda: _package("opencv-python-headless", "cv2"),
     lambda: _package("matplotlib", "matplotlib"),
-    lambda: _extra("gymnasium", "gym", "learning environments"),
     _aruco,
     _egl,
     _rendering,
+    _kernels,
+    _browser,
+    *(partial(_extra, name, *words) for name, words in EXTRAS.items()),
 )
 
 
-def examine() -> list[Finding]:
-    """All checks; where one fails the rest still run."""
-    return [
-        Finding(f.check, f.passed, f.found, "" if f.passed else f.remedy)
-        for f in (check() for check in CHECKS)
-    ]
+@dataclass(frozen=True, repr=False)
+class Examination(Result):
+    """What this machine has and lacks.
+
+    Attributes:
+        findings: One of each check; where one fails the rest still run.
+    """
+
+    findings: Sequence[Finding]
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """A list, an entry for each check."""
+        return [asdict(finding) for finding in self.findings]
+
+    def tables(self) -> list[Table]:
+        """A row for each check."""
+        rows = [
+            (finding.check, "ok" if finding.passed else "missing", finding.found, finding.remedy)
+            for finding in self.findings
+        ]
+        return [Table("cdpr doctor", ("check", "", "found", "remedy"), rows)]
+
+    @property
+    def exit_code(self) -> int:
+        """1 if something is missing."""
+        return 0 if all(finding.passed for finding in self.findings) else 1
+
+
+@dataclass(frozen=True, repr=False)
+class Compilation(Result):
+    """Kernels that were compiled for later.
+
+    Attributes:
+        steps: What was done.
+        seconds: How long that took [s].
+    """
+
+    steps: Sequence[str]
+    seconds: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {"steps": list(self.steps), "wall_time_s": self.seconds}
+
+    def tables(self) -> list[Table]:
+        """None."""
+        return []
+
+    def notes(self) -> list[str]:
+        """How long it took."""
+        return [f"Kernels are compiled and kept; that took {self.seconds:.0f} s."]
+
+
+def examine_installation(
+    *, compile_all: Annotated[bool, Parameter(name="--compile", negative=())] = False,
+    follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
+) -> Examination | Compilation:  # fmt: skip
+    """Checks what this machine has and names the remedy; exit code 1 if something is missing.
+
+    Args:
+        compile_all: Compile the kernels of simulations and tension methods now, once, for later
+            runs; nothing is examined then.
+        follow: Who follows.
+
+    Raises:
+        StoppedError: It was stopped; what is compiled is kept.
+    """
+    if not compile_all:
+        findings = (check() for check in CHECKS)
+        return Examination([
+            replace(finding, remedy="") if finding.passed else finding for finding in findings
+        ])  # fmt: skip
+    names, began = [LISTED, *(name for name, _ in compilation_steps())], time.perf_counter()
+    count = Count(follow, len(names), unit="steps")
+    for job in finished_jobs(compile_step, names, default_workers(), stop=follow.stop):
+        if job.problem is not None:
+            raise job.problem
+        count.add(1, names[job.number])
+    if count.done < len(names):
+        raise StoppedError("stopped; what is compiled is kept")
+    return Compilation(names, time.perf_counter() - began)
 
 
 LISTED = "the default simulation, as listed"

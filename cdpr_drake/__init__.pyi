@@ -1,12 +1,12 @@
 from .analyses.environments import environment_names as environment_names
 from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
+from .analyses.exchange import import_robot as import_robot
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
 from .analyses.front.design import optimize_design as optimize_design
-from .analyses.front.exchange import import_robot as import_robot
 from .analyses.front.failures import compare_reactions as compare_reactions
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log

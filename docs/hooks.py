@@ -17,13 +17,13 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from textwrap import indent
 from typing import Any
 
 import griffe
 import latex2mathml.converter
 import nbformat
-import typer
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -231,22 +231,24 @@ def room_page(room: str) -> str:
 
 
 def commands_page() -> str:
-    """Every subcommand with its arguments and options, as `--help` has them."""
-    from cdpr_drake.cli.app import SUBCOMMANDS, make_app
-    from cdpr_drake.cli.command_help import COMMANDS
+    """Every subcommand with its arguments and options, as its verb declares them."""
+    from cdpr_drake.cli.call import shown_arguments
+    from cdpr_drake.cli.commands import COMMANDS
 
-    out = ["# Commands\n\nAs `cdpr COMMAND --help` prints them.\n"]
-    for name in SUBCOMMANDS:
-        group = typer.main.get_command(make_app([name]))
-        command = group.commands[name]  # type: ignore[attr-defined]
-        out.append(f"\n## cdpr {name}\n\n{command.help or ''}\n")
-        rows = [row for parameter in command.params for row in _parameter_row(parameter)]
+    out = [
+        "# Commands\n\nOutput of `cdpr COMMAND --help`. All commands have `--json`, which prints "
+    ]
+    out.append("the result as JSON, and `--plot [FIGURE=]FILE`, which draws it.\n")
+    for name, command in COMMANDS.items():
+        verb = resolve_name(command.verb)
+        words = re.split(r"\n(?:Args|Raises):\n", inspect.cleandoc(verb.__doc__ or ""))[0]
+        out.append(f"\n## cdpr {name}\n\n{words}\n")
+        rows = [_argument_row(argument) for argument in shown_arguments(name)]
         if rows:
             out.append(
                 "\n| argument or option | meaning |\n| --- | --- |\n" + "\n".join(rows) + "\n"
             )
-        lines = "\n".join(COMMANDS[name][1:])
-        out.append(f"\n```text\n{lines}\n```\n")
+        out.append("\n```text\n" + "\n".join(command.examples) + "\n```\n")
     return "".join(out)
 
 
@@ -265,18 +267,16 @@ def examples_page() -> str:
     return "".join(out)
 
 
-def _parameter_row(parameter: Any) -> Iterator[str]:
-    if getattr(parameter, "hidden", False):
-        return
-    names = list(getattr(parameter, "opts", [])) + list(getattr(parameter, "secondary_opts", []))
-    given = parameter.param_type_name == "option"
-    words = ", ".join(f"`{name if given else name.upper()}`" for name in names)
-    text = html.escape(getattr(parameter, "help", None) or "", quote=False).replace("\n", " ")
+def _argument_row(argument: Any) -> str:
+    names = ", ".join(f"`{name}`" for name in argument.names)
+    text = " ".join(html.escape(argument.parameter.help or "", quote=False).split())
     text = re.sub(r"([|\[\]*_])", r"\\\1", text)  # as it is printed, not as Markdown
-    default = parameter.default
-    if given and isinstance(default, (int, float, str)) and not isinstance(default, bool):
-        text += f" Default: `{default}`."
-    yield f"| {words} | {text} |"
+    choices = argument.get_choices()
+    if choices:
+        text += f" One of {', '.join(f'`{choice}`' for choice in choices)}."
+    default = argument.field_info.default
+    words = argument.show_default(default) if callable(argument.show_default) else None
+    return f"| {names} | {text}{f' Default: `{words}`.' if words else ''} |"
 
 
 def notebooks() -> list[Path]:

@@ -34,11 +34,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import cdpr_drake
-from cdpr_drake.analyses import view
+from cdpr_drake.analyses import installation, view
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies.study import STUDIES, Study
 from cdpr_drake.analyses.workspaces import stability_figures
-from cdpr_drake.cli import app, doctor
+from cdpr_drake.cli import app
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
 from tests.fuzz_cases import Case, draw_case, lay_out
@@ -68,9 +68,9 @@ def lighten() -> None:
     empty = {name: Study(name=name, title="", cases=lambda form: ()) for name in STUDIES}
     sys.modules["cdpr_drake.analyses.studies.empty"] = SimpleNamespace(STUDIES=empty)
     STUDIES.update(dict.fromkeys(STUDIES, "empty"))
-    for module, name in (*PICTURES, (view, "time"), (doctor, "examine")):
+    for module, name in (*PICTURES, (view, "time"), (installation, "CHECKS")):
         assert hasattr(module, name), f"{module.__name__} has no {name} to replace any more"
-    doctor.examine = list
+    installation.CHECKS = ()
 
 
 def load_all() -> None:

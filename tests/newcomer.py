@@ -25,7 +25,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from cdpr_drake.cli.command_help import FIRST_STEPS
+from cdpr_drake.cli.commands import FIRST_STEPS
 
 ROOT = Path(__file__).parents[1]
 
@@ -129,7 +129,7 @@ def page_steps(page: str, text: str) -> Iterator[Step]:
 def first_steps() -> Iterator[Step]:
     """What `cdpr` alone shows."""
     yield Step(page="cdpr", words="cdpr")
-    for words, _ in FIRST_STEPS:
+    for words in FIRST_STEPS:
         yield Step(page="cdpr", words=words)
 
 

@@ -111,8 +111,7 @@ class Folder:
             if not self.resumed and not self._overwrite:
                 words = "; ".join(different[:3]) or "these are complete"
                 raise OutputFolderError(
-                    f"{self.path}: holds other results: {words}; {self._elsewhere} or allow "
-                    "overwrite"
+                    f"{self.path}: holds other results: {words}; {self._elsewhere} or add overwrite"
                 )
             self._files = marker["files"]
         for path in list(self.path.iterdir()):

@@ -37,8 +37,8 @@ class Result(ABC):
     """An answer. It shows itself alike on a terminal, in a notebook and at Python's prompt."""
 
     @abstractmethod
-    def as_dict(self) -> dict[str, Any] | list[Any]:
-        """All numbers, for JSON; keys end in units."""
+    def as_dict(self) -> Any:
+        """All numbers, for JSON; keys end in units. Of a list of things a list."""
 
     @abstractmethod
     def tables(self) -> Sequence[Table]:
@@ -46,6 +46,10 @@ class Result(ABC):
 
     def lines(self) -> Sequence[str]:
         """Sentences below the tables."""
+        return ()
+
+    def notes(self) -> Sequence[str]:
+        """Sentences on what was missing or stopped; a command says them on stderr."""
         return ()
 
     def figures(self) -> Mapping[str, Callable[[], Figure]]:

@@ -47,11 +47,12 @@ def words(
             raise CdprError(f"{option}: found {token.value!r}; accepted: {accepted}") from None
 
     def convert(_kind: Any, tokens: Sequence[Token]) -> Any:
-        return [value(token) for token in tokens] if many else value(tokens[0])
+        return [value(token) for token in tokens] if many else value(tokens[-1])
 
+    convert.many = many  # type: ignore[attr-defined]
     return Parameter(
         name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer,
-        json_list=False, json_dict=False,
+        json_list=False, json_dict=False, negative=(),
     )  # fmt: skip
 
 
@@ -128,10 +129,10 @@ def _files(kind: str) -> Callable[[Any], list[str]]:
 
     def complete(_context: Any) -> list[str]:
         if kind == "scenario":
-            return [path.stem for path in (folder / "systems" / "scenarios").glob("*.yaml")]
+            return sorted(path.stem for path in (folder / "systems" / "scenarios").glob("*.yaml"))
         kinds = ("robot", "mechanism") if kind == "either" else (kind,)
         found = (folder / "models" / "robots").glob("*/*.yaml")
-        return [path.parent.name for path in found if path.stem in kinds]
+        return sorted(path.parent.name for path in found if path.stem in kinds)
 
     return complete
 
@@ -224,3 +225,83 @@ def refuse_arguments(why: str, **arguments: object) -> None:
     names = ", ".join(name for name, value in arguments.items() if value is not None)
     if names:
         raise CdprError(f"{names}: {why}")
+def _in_range(
+    kind: Callable[[str], Any], low: float, high: float | None, what: str, metavar: str,
+    name: str | None = None,
+) -> Parameter:  # fmt: skip
+    def parse(word: str) -> Any:
+        value = kind(word)
+        if not low <= value <= (math.inf if high is None else high) or not math.isfinite(value):
+            raise ValueError(word)
+        return value
+
+    limits = f"at least {low:g}" if high is None else f"from {low:g} to {high:g}"
+    return words(parse, f"{what}, {limits}", metavar, name=name)
+
+
+def whole(
+    low: int, high: int | None = None, metavar: str = "NUMBER", name: str | None = None
+) -> Parameter:
+    """A whole number, not below `low` and not above `high`."""
+    return _in_range(int, low, high, "a whole number", metavar, name)
+
+
+def number(low: float, high: float | None = None, metavar: str = "NUMBER") -> Parameter:
+    """A number, not below `low` and not above `high`."""
+    return _in_range(float, low, high, "a number", metavar)
+
+
+def named_values(
+    known: Sequence[str] | None = None, name: str | None = None, metavar: str = "NAME=VALUE,..."
+) -> Parameter:
+    """Numbers above 0 by name, of name=number with commas; shares may be 0.
+
+    Args:
+        known: Accepted names; None: any.
+        name: The option.
+        metavar: What the help shows in the place of the words.
+    """
+
+    def parse(word: str) -> dict[str, float]:
+        return dict(map(pair, word.split(",")))
+
+    def pair(item: str) -> tuple[str, float]:
+        key, mark, value = item.strip().partition("=")
+        amount = float(value) if mark else math.nan
+        low = amount >= 0.0 if key.endswith("_share") else amount > 0.0
+        if not (low and amount < 1e30) or (known is not None and key not in known):
+            raise ValueError(item)
+        return key, amount
+
+    accepted = "name=number above 0, or several with commas"
+    if known is not None:
+        accepted += f"; names: {', '.join(known)}"
+    return words(parse, accepted, metavar, name=name)
+
+
+def comma_words(name: str | None = None) -> Parameter:
+    """Words with commas between, none of them empty."""
+
+    def parse(word: str) -> tuple[str, ...]:
+        return tuple(part for part in names(word) if part)
+
+    return words(parse, "words with commas", "NAME,...", name=name)
+
+
+NewFolder: TypeAlias = Annotated[Path, words(Path, "the path of a folder", "FOLDER", name="--out")]
+"""Where files are written; by default the working folder."""
+
+Host: TypeAlias = Annotated[
+    str | None, words(str, "a name or an address of this machine", "ADDRESS", name="--host")
+]
+Port: TypeAlias = Annotated[int | None, whole(1, 65535, "PORT")]
+RunsFrom: TypeAlias = Annotated[
+    Path | None, words(Path, "the path of a folder", "FOLDER", name="--runs-from")
+]
+
+OpenedWord: TypeAlias = Annotated[
+    Any,
+    words(str, "a robot, a scenario or a file", "ROBOT|SCENARIO|FILE",
+          completer=lambda context: _files("robot")(context) + _files("scenario")(context)),
+]  # fmt: skip
+"""What the studio opens."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.logs.log_formats import AUTO, read_recorded, unused
 from cdpr_drake.analyses.logs.log_replay import SUMMARY, LogReplay
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImportedLog(Summarized):
+class ImportedLog(Result):
     """A log with SI units in its headers.
 
     Attributes:
@@ -48,13 +50,28 @@ class ImportedLog(Summarized):
         clocks = None if self.joined is None else self.joined.as_dict()
         return {**self.log.as_dict(), "clocks": clocks}
 
-    def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
-        title, rows = self.log.summary()
-        return title, rows if self.joined is None else [("clocks", self.joined.words()), *rows]
+    def tables(self) -> list[Table]:
+        """None."""
+        return []
 
-    def plot(self) -> Figure:
-        """What is in it over time, or over rows where there is none."""
+    def lines(self) -> list[str]:
+        """What it is and holds, a line each."""
+        log = self.log
+        lines = [f"{log.path}: {log.format}, as {log.why}", f"  rows: {log.row_report().words()}"]
+        if self.joined is not None:
+            lines.append(f"  clocks: {self.joined.words()}")
+        headers: dict[int, list[str]] = {}
+        for header, rows in log.measured().items():
+            headers.setdefault(rows, []).append(header)
+        lines += [f"  in {rows} rows: {', '.join(names)}" for rows, names in headers.items()]
+        lines += [f"  {what}: {words}" for what, words in log.units.items()]
+        return lines + [f"  note: {words}" for words in log.remarks]
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """What is in it over time, or over rows if it has no times."""
+        return {"log": self._draw}
+
+    def _draw(self) -> Figure:
         from cdpr_drake.analyses.logs.log_figures import log_figure
 
         return log_figure(self.log)

@@ -179,7 +179,7 @@ def results_folder(
         redo = redo and not overwrite and (final / DRAWING).is_file()
         if any(final.iterdir()) and not (overwrite or redo):
             raise OutputFolderError(
-                f"{final}: holds files already; name another folder or allow overwrite"
+                f"{final}: holds files already; name another folder, or add overwrite"
             )
         _check_replaceable(final)
     made = [parent for parent in final.parents if not parent.exists()]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import shutil
 from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
@@ -161,3 +162,12 @@ def _copy(file: Path, path: Path) -> None:
     """Copies a file, whole or not at all."""
     with whole_file(path) as part:
         part.write_bytes(input_bytes(file))
+
+
+BROWSERS = ("chromium", "google-chrome", "chrome", "msedge")
+"""Programs that print pages."""
+
+
+def browser() -> str | None:
+    """A browser of this machine that prints pages without a window; None: there is none."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)

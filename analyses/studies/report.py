@@ -8,7 +8,6 @@ from __future__ import annotations
 import base64
 import io
 import json
-import shutil
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,7 +20,7 @@ import pandas as pd
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.provenance import browser, code_version, package_versions
 from cdpr_drake.analyses.studies.facts import GOOD, Entry, Fact, sources
 from cdpr_drake.analyses.studies.study import RESULTS, STUDIES, run_study
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
@@ -44,8 +43,6 @@ CAUSES = {
     "ours": "a choice of ours",
     "not known": "not known",
 }
-
-BROWSERS = ("chromium", "google-chrome", "chrome", "msedge")
 
 COLORS = 64
 """Colours of a picture in the page: one with more looks the same, and takes thrice the room."""
@@ -301,10 +298,10 @@ def _picture(path: Path) -> str:
 
 def print_pdf(page: Path) -> Path | None:
     """Prints a page by a browser of this machine; None without one."""
-    browser = next(filter(None, map(shutil.which, BROWSERS)), None)
-    if browser is None:
+    program = browser()
+    if program is None:
         return None
     pdf = page.with_suffix(".pdf")
     options = ["--headless", "--no-sandbox", "--no-pdf-header-footer", f"--print-to-pdf={pdf}"]
-    subprocess.run([browser, *options, page.resolve().as_uri()], check=True, capture_output=True)
+    subprocess.run([program, *options, page.resolve().as_uri()], check=True, capture_output=True)
     return pdf

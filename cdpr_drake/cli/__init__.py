@@ -1,4 +1,4 @@
-"""The `cdpr` command. Each subcommand lives in a file of its own; nothing imports this package."""
+"""The `cdpr` command, made from the verbs that `commands` lists; nothing imports this package."""
 
 import signal
 import threading

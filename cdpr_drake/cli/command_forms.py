@@ -1,69 +1,60 @@
-"""Forms of commands for the studio, made from the functions of the commands themselves."""
+"""Forms of commands for the studio, made from the signatures of their verbs."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, get_args, get_origin, get_type_hints
+from pkgutil import resolve_name
+from typing import Any, get_args
 
-from typer.models import OptionInfo
-
-from cdpr_drake.cli.replay import replay
-from cdpr_drake.cli.stability import stability
-from cdpr_drake.cli.study import study
-from cdpr_drake.cli.workspace import workspace
+from cdpr_drake.cli.call import shown_arguments
+from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.studio.workbench.command_form import CommandForm, CommandOption, OptionKind
 
-OFFERED: dict[str, Callable[..., Any]] = {
-    "workspace": workspace,
-    "stability": stability,
-    "study": study,
-    "replay": replay,
-}
+OFFERED = ("workspace", "stability", "study", "replay")
 """Commands that the studio runs."""
 
-LEFT_OUT = {"out", "json", "overwrite", "help", "scheduler", "along", "threshold",
-            "robot"}  # fmt: skip
+LEFT_OUT = {"out", "overwrite", "along", "threshold", "robot"}
 """Options that are the studio's own business, or of another use of the command."""
 
-KINDS_OF = {
+KINDS = {
     bool: OptionKind.FLAG, int: OptionKind.INTEGER, float: OptionKind.NUMBER, Path: OptionKind.FILE,
 }  # fmt: skip
+
+FILES = ("FILE", "FOLDER")
+"""What the help of options says that take the path of one."""
 
 
 def command_forms() -> dict[str, CommandForm]:
     """Forms of the commands in `OFFERED` by name."""
-    return {name: _form(name, function) for name, function in OFFERED.items()}
+    return {name: _form(name) for name in OFFERED if name in COMMANDS}
 
 
-def _form(name: str, function: Callable[..., Any]) -> CommandForm:
-    hints = get_type_hints(function, include_extras=True)
+def _form(name: str) -> CommandForm:
+    parameters = inspect.signature(resolve_name(COMMANDS[name].verb)).parameters
     options = []
-    for parameter in inspect.signature(function).parameters.values():
-        hint = hints[parameter.name]
-        info = next((each for each in get_args(hint)[1:] if isinstance(each, OptionInfo)), None)
-        if info is None:
+    for argument in shown_arguments(name):
+        parameter, option = parameters[argument.field_info.name], argument.name
+        positional = parameter.kind is parameter.POSITIONAL_ONLY or (
+            parameter.kind is not parameter.KEYWORD_ONLY and parameter.default is parameter.empty
+        )
+        if positional or option.removeprefix("--") in LEFT_OUT:
             continue
-        option = _option(parameter, get_args(hint)[0], info)
-        if option.key not in LEFT_OUT:
-            options.append(option)
-    words = (function.__doc__ or "").strip().splitlines()[0]
-    return CommandForm(name, words, tuple(options))
+        usual = parameter.default
+        if isinstance(usual, tuple | list):
+            usual = ",".join(map(str, usual))
+        options.append(CommandOption(
+            name=option,
+            words=" ".join(str(argument.parameter.help or "").split()),
+            kind=_kind(argument.hint, argument.parameter.metavar),
+            many=getattr(argument.parameter.converter, "many", False),
+            usual="" if usual in (None, parameter.empty) or isinstance(usual, bool) else str(usual),
+        ))  # fmt: skip
+    return CommandForm(name, COMMANDS[name].line, tuple(options))
 
 
-def _option(parameter: inspect.Parameter, hint: Any, info: OptionInfo) -> CommandOption:
-    """An option from a parameter of a command, what it is declared as, and its own words."""
-    parts = [part for part in get_args(hint) if part is not type(None)]
-    plain = parts[0] if parts and get_origin(hint) is not list else hint
-    many = get_origin(plain) is list
-    declared = (info.default, *(info.param_decls or ()))  # Annotated puts the first one there
-    named = [word for word in declared if isinstance(word, str) and word.startswith("--")]
-    usual = parameter.default
-    return CommandOption(
-        name=named[0].partition("/")[0] if named else f"--{parameter.name.replace('_', '-')}",
-        words=str(info.help or ""),
-        kind=KINDS_OF.get(plain, OptionKind.TEXT),
-        many=many,
-        usual="" if usual is None or isinstance(usual, bool) else str(usual),
-    )
+def _kind(hint: Any, metavar: str | None) -> OptionKind:
+    if metavar in FILES:
+        return OptionKind.FILE
+    kinds = [kind for kind in get_args(hint) if kind is not type(None)] or [hint]
+    return KINDS.get(kinds[0], OptionKind.TEXT)

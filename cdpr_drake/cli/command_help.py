@@ -3,40 +3,6 @@
 from __future__ import annotations
 
 COMMANDS: dict[str, tuple[str, str, str]] = {
-    "simulate": (
-        "Run",
-        "cdpr simulate",
-        "cdpr simulate caroca_ibvs --camera projected --seeds 0:20",
-    ),
-    "serve": ("Run", "cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
-    "robots": ("Robots and scenarios", "cdpr robots", "cdpr robots --json"),
-    "scenarios": ("Robots and scenarios", "cdpr scenarios", "cdpr scenarios --json"),
-    "new": (
-        "Robots and scenarios",
-        "cdpr new scenario mine --robot caroca",
-        "cdpr new controller mine",
-    ),
-    "check": (
-        "Robots and scenarios",
-        "cdpr check mine.yaml",
-        "cdpr check robot.yaml scenario.yaml",
-    ),
-    "studio": (
-        "Robots and scenarios",
-        "cdpr studio acrobot_large",
-        "cdpr studio mine.yaml --port 7100",
-    ),
-    "import": (
-        "Robots and scenarios",
-        "cdpr import IPAnema_1_bodies.xml",
-        "cdpr import robot.urdf --out mine",
-    ),
-    "export": (
-        "Robots and scenarios",
-        "cdpr export caroca --format mjcf",
-        "cdpr export caroca --format sdf --out here",
-    ),
-    "schema": ("Robots and scenarios", "cdpr schema robot", "cdpr schema scenario"),
     "workspace": (
         "Analyse",
         "cdpr workspace acrobot_large",
@@ -62,36 +28,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr design acrobot_large --goal capacity-margin",
         "cdpr design acrobot_large --goal static --goal accuracy --quick",
     ),
-    "import-log": (
-        "Real machines",
-        "cdpr import-log series.txt --out series.csv",
-        "cdpr import-log take.csv --log-format motive --out take_log.csv",
-    ),
-    "calibrate": (
-        "Real machines",
-        "cdpr calibrate --campaign acrobot_sensors",
-        "cdpr calibrate hangprinter_4 series.csv",
-    ),
-    "calibrate-camera": (
-        "Real machines",
-        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025",
-        "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye",
-    ),
-    "identify": (
-        "Real machines",
-        "cdpr identify --campaign acrobot_computed_torque",
-        "cdpr identify mine.yaml motion.csv --validate other_motion.csv",
-    ),
-    "replay": (
-        "Real machines",
-        "cdpr replay log.csv --robot hangprinter_4",
-        "cdpr replay log.csv --robot mine.yaml --follow",
-    ),
-    "study": ("Reproduce", "cdpr study worked-examples", "cdpr study tension-methods --quick"),
-    "reproduce": ("Reproduce", "cdpr reproduce --quick", "cdpr reproduce --only case-1,case-2"),
-    "notebooks": ("Tools", "cdpr notebooks", "cdpr notebooks my_notebooks"),
-    "examples": ("Tools", "cdpr examples", "cdpr examples own_controller --out here"),
-    "doctor": ("Tools", "cdpr doctor", "cdpr doctor --compile"),
 }
 """Subcommands in the order of the help: group, and two lines to try or to change."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 
@@ -13,12 +15,14 @@ class Command(NamedTuple):
         verb: Module and function that answers it.
         line: First line of the function's docstring, so that the help imports no verb.
         examples: Lines to try or to change.
+        instead: Other verbs by the options with which they are called instead.
     """
 
     group: str
     verb: str
     line: str
     examples: tuple[str, ...]
+    instead: Mapping[str, str] = MappingProxyType({})
 
 
 FIRST_STEPS = {
@@ -30,40 +34,143 @@ FIRST_STEPS = {
 }
 """What `cdpr` alone shows."""
 
-_VERBS = "cdpr_drake.analyses"
+_VERBS, _CLI = "cdpr_drake.analyses", "cdpr_drake.cli"
+_RUN, _FILES, _ANALYSE, _PLAN, _MACHINES, _STUDIES, _TOOLS = (
+    "Run", "Robots and scenarios", "Analyse", "Plan and design", "Real machines", "Reproduce",
+    "Tools",
+)  # fmt: skip
 
 COMMANDS = {
+    "simulate": Command(
+        _RUN, f"{_CLI}.simulate:simulate",
+        "Simulates a scenario and writes summary, log, figures and replay.",
+        ("cdpr simulate", "cdpr simulate caroca_ibvs --camera projected --seeds 0:20"),
+    ),
+    "serve": Command(
+        _RUN, f"{_CLI}.serve:serve",
+        "Runs a scenario with an external process in its loop, over ZeroMQ.",
+        ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
+    ),
     "environments": Command(
-        "Run", f"{_VERBS}.environments:list_environments",
+        _RUN, f"{_VERBS}.environments:list_environments",
         "Lists the Gymnasium environments, with the sizes of action and observation for a robot.",
         ("cdpr environments",
          "cdpr environments Reach --robot acrobot_small --picture reach.png"),
     ),
+    "robots": Command(
+        _FILES, f"{_VERBS}.catalogues:list_robots",
+        "Lists the robots that come with the package; options filter them.",
+        ("cdpr robots", "cdpr robots --json"),
+    ),
+    "scenarios": Command(
+        _FILES, f"{_VERBS}.catalogues:list_scenarios",
+        "Lists the scenarios that come with the package.",
+        ("cdpr scenarios", "cdpr scenarios --json"),
+    ),
+    "new": Command(
+        _FILES, f"{_VERBS}.templates:write_template",
+        "Writes a robot, scenario, controller, estimator or study to start from.",
+        ("cdpr new scenario mine --robot caroca", "cdpr new controller mine"),
+    ),
+    "check": Command(
+        _FILES, f"{_VERBS}.checks:check_files",
+        "Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.",
+        ("cdpr check mine.yaml", "cdpr check robot.yaml scenario.yaml"),
+    ),
     "view": Command(
-        "Robots and scenarios", f"{_VERBS}.view:view",
+        _FILES, f"{_VERBS}.view:view",
         "Shows a robot or a mechanism at its home, held by its cables, in Meshcat.",
         ("cdpr view acrobot_large", "cdpr view two_platforms"),
     ),
+    "studio": Command(
+        _FILES, f"{_CLI}.studio:studio",
+        "Opens the studio: a local page to edit a robot, see what it can do, and run it.",
+        ("cdpr studio acrobot_large", "cdpr studio mine.yaml --port 7100"),
+    ),
+    "import": Command(
+        _FILES, f"{_VERBS}.exchange:import_files",
+        "Imports a robot from a file of another tool into a folder.",
+        ("cdpr import IPAnema_1_bodies.xml", "cdpr import robot.urdf --out mine"),
+    ),
+    "export": Command(
+        _FILES, f"{_VERBS}.exchange:export_files", "Exports a robot to the format of another tool.",
+        ("cdpr export caroca --format mjcf", "cdpr export caroca --format sdf --out here"),
+    ),
+    "schema": Command(
+        _FILES, f"{_VERBS}.templates:file_schema",
+        "Prints the JSON schema of robot, mechanism or scenario files, for editors.",
+        ("cdpr schema robot", "cdpr schema scenario"),
+    ),
     "tension": Command(
-        "Analyse", f"{_VERBS}.tensions:solve_tensions",
+        _ANALYSE, f"{_VERBS}.tensions:solve_tensions",
         "Finds cable tensions that hold the platform at a pose, or proves that there are none.",
         ("cdpr tension acrobot_large",
          "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all"),
     ),
     "static": Command(
-        "Analyse", f"{_VERBS}.statics.static:solve_static",
+        _ANALYSE, f"{_VERBS}.statics.static:solve_static",
         "Computes lengths, tensions, stiffness, vibrations and sag of a robot at rest.",
         ("cdpr static acrobot_large",
          "cdpr static caroca --pose 0,0,1.5 --cable-model catenary"),
     ),
     "equilibria": Command(
-        "Analyse", f"{_VERBS}.equilibria:find_equilibria",
+        _ANALYSE, f"{_VERBS}.equilibria:find_equilibria",
         "Finds all poses of rest, stable or not, with any cables slack, for lengths or a position.",
         ("cdpr equilibria grab_three --position 0.6,1.16,-1.5",
          "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3"),
     ),
+    "import-log": Command(
+        _MACHINES, f"{_CLI}.import_log:import_log",
+        "Reads a log as a machine or a tracker wrote it, and writes one that calibrate and "
+        "identify take.",
+        ("cdpr import-log series.txt --out series.csv",
+         "cdpr import-log take.csv --log-format motive --out take_log.csv"),
+    ),
+    "calibrate": Command(
+        _MACHINES, f"{_CLI}.calibrate:calibrate",
+        "Finds a robot's constants in a log of what was measured at poses of its platform.",
+        ("cdpr calibrate --campaign acrobot_sensors", "cdpr calibrate hangprinter_4 series.csv"),
+    ),
+    "calibrate-camera": Command(
+        _MACHINES, f"{_CLI}.calibrate_camera:calibrate_camera",
+        "Finds a camera's intrinsic parameters and its lens in images of a board.",
+        ("cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025",
+         "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye"),
+    ),
+    "identify": Command(
+        _MACHINES, f"{_CLI}.identify:identify", "Finds a robot's dynamics in a log of a motion.",
+        ("cdpr identify --campaign acrobot_computed_torque",
+         "cdpr identify mine.yaml motion.csv --validate other_motion.csv"),
+    ),
+    "replay": Command(
+        _MACHINES, f"{_CLI}.replay:replay",
+        "Replays a log of a machine beside a model of it, with residuals by cable.",
+        ("cdpr replay log.csv --robot hangprinter_4",
+         "cdpr replay log.csv --robot mine.yaml --follow"),
+    ),
+    "study": Command(
+        _STUDIES, f"{_CLI}.study:study",
+        "Runs a study and writes results.json, tables and figures; Ctrl-C keeps what is finished.",
+        ("cdpr study worked-examples", "cdpr study tension-methods --quick"),
+    ),
+    "reproduce": Command(
+        _STUDIES, f"{_CLI}.study:reproduce",
+        "Runs every study and writes one page on what sources print beside what is found.",
+        ("cdpr reproduce --quick", "cdpr reproduce --only case-1,case-2"),
+    ),
     "notebooks": Command(
-        "Tools", f"{_VERBS}.front.scenarios:load_scenario", "Lists notebooks, or copies them.",
+        _TOOLS, f"{_VERBS}.programs:copy_notebooks",
+        "Copies the notebooks to a folder, or lists them; never overwrites a file.",
         ("cdpr notebooks", "cdpr notebooks my_notebooks"),
+    ),
+    "examples": Command(
+        _TOOLS, f"{_VERBS}.programs:copy_examples",
+        "Lists short programs to start from, or copies one; never overwrites a file.",
+        ("cdpr examples", "cdpr examples own_controller --out here"),
+    ),
+    "doctor": Command(
+        _TOOLS, f"{_VERBS}.installation:examine_installation",
+        "Checks what this machine has and names the remedy; exit code 1 if something is missing.",
+        ("cdpr doctor", "cdpr doctor --compile"),
     ),
 }  # fmt: skip

@@ -35,8 +35,9 @@ def following(name: str, long: bool, options: Mapping[str, str]) -> Iterator[Fol
 
         def progress(now: Progress) -> None:
             speed = (now.done - now.found) / now.seconds if now.seconds else 0.0
-            state = f"{speed:.1f} {now.unit}/s, {now.what}" if speed else now.what
-            bar.update(task, completed=now.done, total=now.total, state=state)
+            rate = f"{speed:.1f} {'x real time' if now.unit == 's' else f'{now.unit}/s'}"
+            state = f"{rate}, {now.what}" if speed else now.what
+            bar.update(task, completed=now.done, total=now.total or None, state=state)
 
         def say(words: str) -> None:
             console.print(with_options(words, options))

@@ -1,53 +1,83 @@
-"""What `cdpr calibrate` and `cdpr identify` share: options of a robot with a log, and its end."""
+"""Options of commands that read logs, and the end of those that fit a robot to one."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeAlias
 
-import typer
-
+from cdpr_drake.analyses.frame.words import one_of, words
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot
+from cdpr_drake.analyses.logs.log_formats import AUTO, LOG_READERS
+from cdpr_drake.analyses.logs.log_request import (
+    LogRequest,
+    axes_rotation,
+    checked_units,
+    is_rate,
+    read_mapping,
+)
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.cli.command_session import CommandSession, shown
-from cdpr_drake.cli.completion import robot_words
-from cdpr_drake.cli.run_endings import MISFIT, report_failures
-from cdpr_drake.cli.terminal import print_json, wide_console
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.cli.process import MISFIT
+from cdpr_drake.cli.sessions import Answer, FollowedSession, failures
 from cdpr_drake.errors import CdprError
 
-RobotOrCampaign = Annotated[
-    str | None,
-    typer.Argument(
-        help="Robot by name, or path of a robot file.",
-        autocompletion=robot_words,
-        show_default=False,
-    ),
-]
-LogOrCampaign = Annotated[
-    Path | None,
-    typer.Argument(help="Log, text with columns.", metavar="LOG", show_default=False),
-]
-TrackerLate = Annotated[
-    float | None, typer.Option(help="By how much the tracker's poses are late [s].")
-]
-ResultsBelowRuns = Annotated[
-    Path | None, typer.Option(help="Results folder; default: a new one below runs/.")
-]
-STOPPING = ""
-"""Nothing is answered to Ctrl-C, which ends a fit at once."""
+
+def _units(word: str) -> dict[str, str]:
+    pairs = [item.strip().partition("=") for item in word.split(",")]
+    if not all(mark for _, mark, _ in pairs):
+        raise ValueError(word)
+    return checked_units({dimension: unit for dimension, _, unit in pairs})
 
 
-def check_campaign(robot: str | None, log: Path | None) -> None:
-    """Refuses a robot or a log beside a campaign.
+def _rate(word: str) -> float:
+    rate = float(word)
+    if not is_rate(rate):
+        raise ValueError(word)
+    return rate
+
+
+LogFormat: TypeAlias = Annotated[str, one_of((*LOG_READERS, AUTO))]
+Units: TypeAlias = Annotated[
+    dict[str, str] | None,
+    words(_units, "DIMENSION=UNIT, as length=mm, or several with commas", "DIMENSION=UNIT,...",
+          name="--unit"),
+]  # fmt: skip
+Mapping: TypeAlias = Annotated[Path | None, words(Path, "the path of a YAML file", "FILE")]
+Rate: TypeAlias = Annotated[float | None, words(_rate, "above 0 [1/s]", "RATE")]
+Axes: TypeAlias = Annotated[Any, words(axes_rotation, "three axes, as -z,-x,y", "AXIS,AXIS,AXIS")]
+
+
+def log_request(
+    cables: Sequence[str] | None = None, *, unit: dict[str, str] | None, mapping: Path | None,
+    rate: float | None, body: str | None, axes: Any,
+) -> LogRequest:  # fmt: skip
+    """What options say of a log.
+
+    Raises:
+        CdprError: Names of cables are empty or the same.
+    """
+    if cables is not None and (not all(cables) or len(set(cables)) < len(cables)):
+        raise CdprError(
+            f"cables: found {', '.join(cables)!r}; accepted: different names, as A,B,C,D"
+        )
+    return LogRequest(
+        cables=None if cables is None else tuple(cables), units=unit or {}, body=body, rate=rate,
+        mapping=None if mapping is None else read_mapping(mapping), R_WF=axes,
+    )  # fmt: skip
+
+
+def check_campaign(robot: object, log: object) -> None:
+    """Refuses a robot, a log or what goes with them beside a campaign.
 
     Raises:
         CdprError: There is one.
     """
     if robot is not None or log is not None:
-        raise CdprError(f"--campaign: found beside {log or robot}; accepted: without robot, log")
+        raise CdprError(f"campaign: found beside {log or robot}; accepted: without robot, log")
 
 
-def robot_and_log(command: str, robot: str | None, log: Path | None) -> tuple[str, Path]:
+def robot_and_log(command: str, robot: Any, log: Path | None) -> tuple[Any, Path]:
     """Both, where a command has no campaign.
 
     Raises:
@@ -63,30 +93,12 @@ def results_below_runs(out: Path | None, name: str) -> Path:
     return out if out is not None else free_folder(Path("runs") / name)
 
 
-def comma_words(option: str) -> tuple[str, ...]:
-    """Words of an option, with commas between them."""
-    return tuple(word.strip() for word in option.split(",") if word.strip())
-
-
-def tell_fit(found: FittedRobot, session: CommandSession, as_json: bool) -> int:
-    """Prints JSON, or tables and where the results are.
-
-    Args:
-        found: What was found, in its folder.
-        session: Who followed it.
-        as_json: Whether JSON is wanted.
-
-    Returns:
-        The exit code; `MISFIT` where what was found does not fit what was measured.
-    """
-    session.say_kept()
-    folder = shown(found.folder)
-    if as_json:
-        print_json(found.as_dict())
-    else:
-        printer = wide_console(140)
-        for table in found.tables():
-            printer.print(table)
-        printer.print(f"results: {folder}")
-    missing = report_failures(session.console, found.failed, folder, None)
-    return missing if found.fits else MISFIT
+def fit_answer(fit: FittedRobot, session: FollowedSession) -> Answer:
+    """Tables of a fit and where the results are; `MISFIT` if it does not fit what was measured."""
+    folder = shown_path(fit.folder or Path())
+    missing = [f"The data is complete in {folder}"] if fit.failed else []
+    return Answer(
+        numbers=fit.as_dict(), printed=[*fit.tables(), f"results: {folder}"],
+        words=[*session.kept(), *missing], code=0 if fit.fits else MISFIT,
+        failed=failures(fit.failed, folder), drawing=fit.plot,
+    )  # fmt: skip

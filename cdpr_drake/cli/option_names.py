@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+from cdpr_drake.errors import CdprError
 
 SHARED_OPTIONS = {
     "overwrite": "--overwrite",
@@ -17,7 +20,7 @@ SHARED_OPTIONS = {
 """Options by the arguments that mean the same in every command; of `workers` the library refuses
 addresses of schedulers alone."""
 
-BEFORE = ("allow", "found", "leave out", "needs", "use", "with", "without")
+BEFORE = ("add", "allow", "found", "leave out", "needs", "use", "with", "without")
 """Words of a message after which an argument is named."""
 
 
@@ -35,6 +38,8 @@ def with_options(message: str, options: Mapping[str, str]) -> str:
 
 
 def _line_with_options(line: str, options: Mapping[str, str]) -> str:
+    if not options:
+        return line
     known = "|".join(map(re.escape, sorted(options, key=len, reverse=True)))
     named = rf"(?:{known})(?=[:;,) ]|$)"
     head = re.match(rf"{named}(?:, {named})*", line)
@@ -54,3 +59,22 @@ def _is_refused(place: re.Match[str]) -> bool:
     """Whether what stands there is what was found wrong, as in `log.csv: bandwidth: found 0 Hz`."""
     line = place.string
     return line.endswith(":", 0, place.start()) and line.startswith(": found", place.end())
+
+
+@contextmanager
+def named_options(options: Mapping[str, str]) -> Iterator[None]:
+    """Says options where what is refused inside the block says Python's arguments.
+
+    Args:
+        options: Options by the words for arguments, as `with_options` takes them.
+    """
+    try:
+        yield
+    except CdprError as problem:
+        problem.args = tuple(
+            with_options(words, options) if isinstance(words, str) else words
+            for words in problem.args
+        )
+        if hasattr(problem, "__notes__"):
+            problem.__notes__ = [with_options(note, options) for note in problem.__notes__]
+        raise

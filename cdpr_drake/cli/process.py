@@ -26,6 +26,18 @@ from cdpr_drake.kernel_cache.kernel_list import missing_kernels, needed_kernels
 INTERRUPTED = 130
 """Exit code of what Ctrl-C or SIGTERM ended, as shells have it for the former."""
 
+INCOMPLETE = 3
+"""Exit code where the data is complete and something that is made of it is missing."""
+
+CLIENT_ENDED = 4
+"""Exit code of a run that ended early because of the process outside that closes its loop."""
+
+STUDY_FAILED = 5
+"""Exit code of a reproduction of which a study failed; the report says which."""
+
+MISFIT = 6
+"""Exit code of a calibration or an identification that does not fit what was measured."""
+
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """What asks to stop."""
 

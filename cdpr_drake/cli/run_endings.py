@@ -10,19 +10,7 @@ from rich.console import Console
 from cdpr_drake.analyses.reporting.left_folders import KeptFiles, holds_log
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
 from cdpr_drake.analyses.reporting.progress import WorkProgress
-from cdpr_drake.cli.process import INTERRUPTED, StopRequest
-
-INCOMPLETE = 3
-"""Exit code where the data is complete and something that is made of it is missing."""
-
-CLIENT_ENDED = 4
-"""Exit code of a run that ended early because of the process outside that closes its loop."""
-
-STUDY_FAILED = 5
-"""Exit code of a reproduction of which a study failed; the report says which."""
-
-MISFIT = 6
-"""Exit code of a calibration or an identification that does not fit what was measured."""
+from cdpr_drake.cli.process import INCOMPLETE, INTERRUPTED, StopRequest
 
 
 def report_recovered(console: Console, results: ResultsFolder) -> None:

@@ -5,17 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.words import (
+    Formats,
+    OutFolder,
+    Overrides,
+    ScenarioWord,
+    number,
+    one_of,
+    whole,
+)
 from cdpr_drake.analyses.front.simulation import simulate
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.cli.completion import scenario_words, words_among
-from cdpr_drake.cli.options import LISTENING, FigureFormats, Overwrite, named_options, parse_formats
-from cdpr_drake.cli.process import StopRequest
-from cdpr_drake.cli.run_endings import CLIENT_ENDED
-from cdpr_drake.cli.simulate import STOPPING, SimulationSession, tell_run
-from cdpr_drake.cli.terminal import message_console
+from cdpr_drake.cli.process import CLIENT_ENDED
+from cdpr_drake.cli.sessions import Answer
+from cdpr_drake.cli.simulate import RunSession, run_answer
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -31,100 +38,73 @@ from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenari
 
 
 def serve(
-    scenario: Annotated[
-        str,
-        typer.Argument(
-            help="Scenario by name, or path of a YAML file.", autocompletion=scenario_words
-        ),
-    ],
-    place: Annotated[
-        str | None,
-        typer.Option(
-            help="Block that the client replaces: distributor, controller or trajectory of dynamic "
-            "control, servo or twist of a visual servo.",
-            autocompletion=words_among((*TENSION_PLACES, *SERVO_PLACES)),
-        ),
-    ] = None,
-    pace: Annotated[
-        str | None,
-        typer.Option(
-            help="lock_step or real_time.",
-            autocompletion=words_among([each.value for each in SyncMode]),
-        ),
-    ] = None,
-    timeout: Annotated[
-        float | None, typer.Option(help="Silence of the client after which the run ends [s].")
-    ] = None,
-    wait: Annotated[
-        float, typer.Option(help="Longest time to wait for a client [s].", min=0.0)
-    ] = 60.0,
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Address of this machine to listen at, * for all; whoever reaches it may drive "
-            "the run."
-        ),
-    ] = LOCAL_HOST,
-    port: Annotated[
-        int, typer.Option(help="Port, 0 for a free one.", min=0, max=65535)
-    ] = USUAL_PORT,
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; default: a new one below runs/.")
-    ] = None,
-    duration: Annotated[float | None, typer.Option(help="Longest simulated time [s].")] = None,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="key=value of the scenario, such as integration.engine=plant."),
-    ] = None,
-    overwrite: Overwrite = False,
-    figure_format: FigureFormats = "png",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
-) -> int:
+    scenario: ScenarioWord, /, *,
+    place: Annotated[str | None, one_of((*TENSION_PLACES, *SERVO_PLACES))] = None,
+    pace: Annotated[str | None, one_of([each.value for each in SyncMode])] = None,
+    timeout: float | None = None, wait: Annotated[float, number(0)] = 60.0,
+    host: str = LOCAL_HOST, port: Annotated[int, whole(0, 65535, "PORT")] = USUAL_PORT,
+    out: OutFolder = None, duration: float | None = None, overrides: Overrides = (),
+    overwrite: bool = False, formats: Formats = ("png",),
+    follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
+) -> Answer | int:  # fmt: skip
     """Runs a scenario with an external process in its loop, over ZeroMQ.
 
     The client may be in any language: cdpr_drake.systems.remote documents the messages and offers
     RemoteClient for Python. notebooks/plain_client.py is a client that does not use this package.
+
+    Args:
+        scenario: Scenario by name, or path of a YAML file.
+        place: Block that the client replaces: distributor, controller or trajectory of dynamic
+            control, servo or twist of a visual servo.
+        pace: Each step waits for the client, or real time.
+        timeout: Silence of the client after which the run ends [s].
+        wait: Longest time to wait for a client [s].
+        host: Address of this machine to listen at, * for all; whoever reaches it may drive the run.
+        port: Port, 0 for a free one.
+        out: Results folder; default: a new one below runs/.
+        duration: Longest simulated time [s].
+        overrides: Key and value of the scenario, such as integration.engine=plant.
+        overwrite: Replace results in the folder.
+        formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
+        follow: Who follows.
     """
     check_available()
     kind = SCENARIO_KINDS[scenario_kind(scenario)]
     check_moves_robot(scenario, "cdpr serve")
-    overrides, formats = list(settings or []), parse_formats(figure_format)
+    items = list(overrides)
     for key, value in (
         ("remote.place", place), ("duration", duration), ("remote.pace", pace),
         ("remote.timeout", timeout),
     ):  # fmt: skip
         if value is not None:
-            overrides.append(f"{key}={value}")
-    if place is None and load_scenario(scenario, list(settings or [])).remote is None:
+            items.append(f"{key}={value}")
+    if place is None and load_scenario(scenario, list(overrides)).remote is None:
         usual = SERVO_PLACES if kind.has_camera else TENSION_PLACES
-        overrides.append(f"remote.place={usual[0]}")
-    loaded = load_scenario(scenario, overrides)
+        items.append(f"remote.place={usual[0]}")
+    loaded = load_scenario(scenario, items)
     folder = out if out is not None else free_folder(Path("runs") / loaded.name)
-    session = SimulationSession(STOPPING, folder)
+    session = RunSession(follow, folder)
     try:
-        with _Client(loaded, host, port, wait, session.request) as client, session:
+        with _Client(loaded, host, port, wait, follow) as client:
             session.outside = client
-            found = simulate(
+            run = simulate(
                 loaded, folder=folder, overwrite=overwrite, formats=formats, session=session
             )
-            code = tell_run(found, session, as_json)
-        session.say_kept()
-        return code
+        return run_answer(run, session, duration)
     except ClientEndedError as problem:  # before the first step
-        message_console().print(f"cdpr: {problem}; nothing was simulated")
+        follow.say(f"cdpr: {problem}; nothing was simulated")
         return CLIENT_ENDED
 
 
 class _Client:
     """Waits for a client, and tells it how the run ended."""
 
-    def __init__(self, scenario: Any, host: str, port: int, wait: float, stop: StopRequest) -> None:
-        self._scenario, self._wait = scenario, wait
+    def __init__(self, scenario: Any, host: str, port: int, wait: float, follow: Follow) -> None:
+        self._scenario, self._wait, self._say = scenario, wait, follow.say
         self._driver: Driver | None = None
-        with named_options(LISTENING):
-            self._socket = Socket(host, port, stop)
+        self._socket = Socket(host, port, follow.stop)
         if not is_loopback(host):
-            message_console().print(
+            self._say(
                 f"warning: {self._socket.address} is open to other machines: whoever reaches it "
                 "may drive the run; there is no password, and nothing is encrypted"
             )
@@ -157,7 +137,7 @@ class _Client:
             period=1.0 / scenario.controller.rate,
             services={"distribute": self._distribution(robot)},
         )
-        message_console().print(
+        self._say(
             f"{scenario.name}: waiting at {self._socket.address} for a client in the place "
             f"{remote.place}, {scenario.remote.pace.replace('_', ' ')}"
         )

@@ -13,9 +13,9 @@ from tempfile import NamedTemporaryFile
 from threading import Thread
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from cyclopts import Parameter
 
-from cdpr_drake.cli.completion import studio_words
+from cdpr_drake.analyses.frame.words import OpenedWord, whole
 from cdpr_drake.errors import CdprError
 
 if TYPE_CHECKING:
@@ -26,42 +26,28 @@ TOKEN_VARIABLE = "CDPR_STUDIO_TOKEN"
 
 
 def studio(
-    opened: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[ROBOT|SCENARIO|FILE]",
-            help="Robot or scenario by name, or the path of a file, also of another tool.",
-            autocompletion=studio_words,
-        ),
-    ] = None,
-    folder: Annotated[
-        Path, typer.Option(help="Working folder; the page reads and writes no files elsewhere.")
-    ] = Path(),
-    host: Annotated[
-        str,
-        typer.Option(
-            help="Name or address of this machine to listen at, * for all; the connection is not "
-            "encrypted."
-        ),
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port, 0 for a free one.", min=0, max=65535)] = 8642,
-    no_token: Annotated[
-        bool,
-        typer.Option(
-            "--no-token",
-            help="Ask nobody for a token: every program and user of this machine may then open the "
-            "page, read and write in the working folder, and start runs. Not with --host of "
-            "other machines.",
-        ),
-    ] = False,
-    browser: Annotated[bool, typer.Option(help="Open the page in a browser.")] = True,
-) -> None:
+    opened: OpenedWord = None, /, *, folder: Path = Path(), host: str = "127.0.0.1",
+    port: Annotated[int, whole(0, 65535, "PORT")] = 8642,
+    no_token: Annotated[bool, Parameter(name="--no-token", negative=())] = False,
+    browser: bool = True,
+) -> None:  # fmt: skip
     """Opens the studio: a local page to edit a robot, see what it can do, and run it.
 
     The printed address contains a token, new at each start, that every request needs. The
     environment variable CDPR_STUDIO_TOKEN sets the token, which is then not printed.
 
     Needs the extra `studio`: pip install 'cdpr_drake[studio]'.
+
+    Args:
+        opened: Robot or scenario by name, or the path of a file, also of another tool.
+        folder: Working folder; the page reads and writes no files elsewhere.
+        host: Name or address of this machine to listen at, * for all; the connection is not
+            encrypted.
+        port: Port, 0 for a free one.
+        no_token: Disable token authentication: every program and user of this machine may then open
+            the page, read and write in the working folder, and start runs. Not with --host of other
+            machines.
+        browser: Open the page in a browser.
     """
     token = _wanted_token(no_token)
     if find_spec("nicegui") is None:

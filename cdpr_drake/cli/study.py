@@ -1,106 +1,122 @@
-"""`cdpr study`: runs a study and writes its numbers and figures."""
+"""`cdpr study` and `cdpr reproduce`: runs a study, or all, and writes numbers and figures."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.folder import free_folder
-from cdpr_drake.analyses.reporting.tables import frame_table
-from cdpr_drake.analyses.studies.study import (
-    MOST_SEEDS,
-    STUDIES,
-    Form,
-    arguments_of,
-    run_study,
-    study_named,
-)
-from cdpr_drake.cli.completion import words_among
-from cdpr_drake.cli.following import following
-from cdpr_drake.cli.options import (
-    FigureFormats,
-    Overwrite,
-    ResultsAsJson,
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.words import (
+    Formats,
+    Names,
+    OutFolder,
     RunsFrom,
-    Scheduler,
-    named_options,
-    parse_formats,
+    Workers,
+    one_of,
+    whole,
 )
-from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import INCOMPLETE, STUDY_FAILED
-from cdpr_drake.cli.terminal import message_console, print_json, wide_console
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.reporting.tables import frame_table
+from cdpr_drake.analyses.studies.report import print_pdf
+from cdpr_drake.analyses.studies.report import reproduce as reproduce_all
+from cdpr_drake.analyses.studies.study import MOST_SEEDS, STUDIES, Form, arguments_of, run_study
+from cdpr_drake.cli.process import INCOMPLETE, INTERRUPTED, STUDY_FAILED
+from cdpr_drake.cli.sessions import Answer, failures
 
-OPTIONS = {"seeds": "--seeds", "recipe": "--recipe", "runs_from": "--runs-from"}
-"""Options by the arguments of `run_study`."""
-
-PIPE_WIDTH = 160
-"""Width of tables where there is no terminal [characters]."""
-
-
-def help_words() -> str:
-    """What `cdpr study --help` says above the options."""
-    return (
-        "Runs a study and writes results.json, tables and figures; Ctrl-C keeps what is finished."
-        "\n\nRun again with the same --out, it continues where it was stopped or killed."
-    )
+Following = Annotated[Follow, Parameter(parse=False)]
 
 
 def study(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="Which study: " + ", ".join(STUDIES) + ".", autocompletion=words_among(STUDIES)
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Results folder; default: one below studies/.")
-    ] = None,
-    quick: Annotated[bool, typer.Option(help="A short form, to see that it works.")] = False,
-    seeds: Annotated[
-        int | None,
-        typer.Option(help="How often what depends on chance is measured.", min=1, max=MOST_SEEDS),
-    ] = None,
-    workers: Annotated[
-        int | None,
-        typer.Option(help="Processes; default: one for each processor, for long work.", min=1),
-    ] = None,
-    as_json: ResultsAsJson = False,
-    overwrite: Overwrite = False,
-    figure_format: FigureFormats = "png",
-    scheduler: Scheduler = None,
-    runs_from: RunsFrom = None,
-    recipe: Annotated[
-        str, typer.Option(help="Another recipe for the same rows, for studies that have some.")
-    ] = "",
-) -> int:
-    """Runs a study and writes results.json and figures; Ctrl-C keeps what is finished."""
-    study_named(name)
-    formats, form = parse_formats(figure_format), Form(quick, seeds, recipe)
+    name: Annotated[str, one_of(STUDIES)], /, *, out: OutFolder = None, quick: bool = False,
+    seeds: Annotated[int | None, whole(1, MOST_SEEDS)] = None, workers: Workers = None,
+    overwrite: bool = False, formats: Formats = ("png",), runs_from: RunsFrom = None,
+    recipe: str = "", follow: Following = NOBODY,
+) -> Answer:  # fmt: skip
+    """Runs a study and writes results.json, tables and figures; Ctrl-C keeps what is finished.
+
+    Run again with the same --out, it continues where it was stopped or killed.
+
+    Args:
+        name: Which study.
+        out: Results folder; default: one below studies/.
+        quick: A short form, to see that it works.
+        seeds: How often what depends on chance is measured.
+        workers: Processes, or a Dask scheduler whose workers compute, tcp://host:port; default: one
+            for each processor, for long work.
+        overwrite: Replace results in the folder.
+        formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
+        runs_from: Results folder by an earlier version of the code, whose runs of the same cases
+            are taken over; the results say so.
+        recipe: Another recipe for the same rows, for studies that have some.
+        follow: Who follows.
+    """
     usual = Path("studies") / "-".join(filter(None, (name, recipe)))
-    folder = out or free_folder(usual, arguments_of(name, form))
-    with named_options(OPTIONS), following(name) as follow:
-        result = run_study(
-            name, folder, quick, seeds=seeds, recipe=recipe,
-            workers=workers if scheduler is None else scheduler, overwrite=overwrite,
-            formats=formats, runs_from=runs_from, follow=follow,
-        )  # fmt: skip
-    if as_json:
-        print_json(result.as_dict())
-    else:
-        printer = wide_console(PIPE_WIDTH)
-        for title, table in result.tables().items():
-            printer.print(frame_table(title, table))
-        printer.print(f"results: {folder}")
-    console = message_console()
-    for file, why in result.undrawn.items():
-        console.print(f"cdpr: {folder / file}: not written: {why}")
-    for words in result.failed.values():
-        console.print(f"cdpr: failed: {words}")
+    folder = out or free_folder(usual, arguments_of(name, Form(quick, seeds, recipe)))
+    result = run_study(
+        name, folder, quick, seeds=seeds, recipe=recipe, workers=workers, overwrite=overwrite,
+        formats=formats, runs_from=runs_from, follow=follow,
+    )  # fmt: skip
+    tables = [frame_table(title, table) for title, table in result.tables().items()]
+    answer = Answer(
+        numbers=result.as_dict(), printed=[*tables, f"results: {folder}"],
+        words=[f"cdpr: failed: {words}" for words in result.failed.values()],
+        code=STUDY_FAILED if result.failed else 0, failed=failures(result.undrawn, folder),
+        drawing=result.plot,
+    )  # fmt: skip
     if result.stopped:
-        console.print(f"Interrupted; the same command with --out {folder} goes on")
-        return INTERRUPTED
-    if result.failed:
-        return STUDY_FAILED
-    return INCOMPLETE if result.undrawn else 0
+        words = f"Interrupted; the same command with --out {folder} goes on"
+        return replace(answer, code=INTERRUPTED, words=(*answer.words, words))
+    return answer
+
+
+def reproduce(
+    *, out: OutFolder = None, quick: bool = False, only: Names | None = None,
+    workers: Workers = None, overwrite: bool = False, formats: Formats = ("png",),
+    runs_from: RunsFrom = None, against: Path | None = None, pdf: bool = False,
+    follow: Following = NOBODY,
+) -> Answer:  # fmt: skip
+    """Runs every study and writes one page on what sources print beside what is found.
+
+    All studies take hours in their full forms. Finished studies run again only if the code has
+    changed. The same command continues an interrupted one. A study that fails does not stop the
+    others.
+
+    Args:
+        out: Results folder; default: reproduction or reproduction-quick.
+        quick: Studies in their short forms, in a quarter of an hour.
+        only: Some studies alone, by name, such as case-9,stability-ranges.
+        workers: Processes, or a Dask scheduler whose workers compute, tcp://host:port; default: one
+            for each processor, for long work.
+        overwrite: Replace results in the folder.
+        formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
+        runs_from: Results folder by an earlier version of the code, whose runs of the same cases
+            are taken over; the results say so.
+        against: Folder of an older report: the new one says which verdicts changed.
+        pdf: Print the report into a PDF, too, by a browser of this machine.
+        follow: Who follows.
+    """
+    folder = out or Path("reproduction-quick" if quick else "reproduction")
+    chosen = None if only is None else [name for name in only if name]
+    report = reproduce_all(
+        folder, quick, chosen, workers=workers, overwrite=overwrite, formats=formats,
+        runs_from=runs_from, against=against, follow=follow,
+    )  # fmt: skip
+    unprinted = pdf and print_pdf(report.page) is None
+    words = [f"cdpr: study failed: {name}: {why}" for name, why in report.failed.items()]
+    code = STUDY_FAILED if report.failed else INCOMPLETE if unprinted else 0
+    if unprinted:
+        words.append("cdpr: --pdf: no browser here prints; open the page in one and print it")
+    if report.left:
+        words.append(f"Interrupted; left: {', '.join(report.left)}; the same command goes on")
+        code = INTERRUPTED
+    table: Any = frame_table(
+        "What sources print, beside what is found", report.counts().reset_index()
+    )
+    return Answer(
+        numbers=report.as_dict(), printed=[table, f"report: {shown_path(report.page)}"],
+        words=words, code=code, failed=failures(report.undrawn, folder),
+    )  # fmt: skip

@@ -5,7 +5,7 @@ from cdpr_drake.errors import RenderingError
 
 
 def test_this_machine_is_well():
-    findings = doctor.examine()
+    findings = doctor.examine_installation().findings
     assert [f for f in findings if not f.passed] == []
     assert {"Python", "drake", "EGL", "rendered camera"} <= {f.check for f in findings}
 
@@ -16,7 +16,7 @@ def test_missing_egl_is_named(monkeypatch):
 
     monkeypatch.setattr(doctor, "check_rendering", missing)
     monkeypatch.setattr(doctor, "CHECKS", (doctor._egl, doctor._python))
-    egl, python = doctor.examine()
+    egl, python = doctor.examine_installation().findings
     assert not egl.passed
     assert "libegl1" in egl.remedy
     assert python.passed
@@ -33,7 +33,7 @@ def test_what_is_optional_and_absent_is_no_fault_but_named():
     finding = doctor._extra("no-such-package", "gym", "learning environments")
     assert finding.passed
     assert "pip install 'cdpr_drake[gym]'" in finding.found
-    assert "gymnasium" in {one.check for one in doctor.examine()}
+    assert "gymnasium" in {one.check for one in doctor.examine_installation().findings}
 
 
 def test_missing_package_is_named():

@@ -6,10 +6,8 @@ import re
 import subprocess
 import sys
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Annotated, get_origin, get_type_hints
 from xml.etree import ElementTree
 
 import numpy as np
@@ -33,15 +31,18 @@ def test_the_package_is_a_command():
     assert re.match(r"cdpr_drake .*, Drake 1\.", done.stdout)
 
 
-@pytest.mark.parametrize("command", ["simulate", "study", "stability"])
-def test_help_has_units(capsys, monkeypatch, command):
-    monkeypatch.setenv("COLUMNS", "200")
-    _, said, _ = run(capsys, command, "--help")
-    function = getattr(import_module(f"cdpr_drake.cli.{command}"), command)
-    hints = get_type_hints(function, None, None, True).values()
-    helps = [hint.__metadata__[0].help for hint in hints if get_origin(hint) is Annotated]
-    for unit in (unit for words in helps for unit in re.findall(r"\[.+?\]", words)):
-        assert unit in said
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_units_and_examples(capsys, monkeypatch, command):
+    """The words of each argument reach the terminal as they stand in the verb's docstring."""
+    monkeypatch.setenv("COLUMNS", "250")
+    code, said, _ = run(capsys, command, "--help")
+    words = " ".join(resolve_name(COMMANDS[command].verb).__doc__.partition("Raises:")[0].split())
+    assert code == 0
+    assert COMMANDS[command].line == words[: len(COMMANDS[command].line)]
+    assert set(re.findall(r"\[[^]\[]+?\]", words.rpartition("Args:")[2])) <= set(
+        re.findall(r"\[[^]\[]+?\]", " ".join(said.replace("│", " ").split()))
+    )
+    assert all(example in " ".join(said.split()) for example in COMMANDS[command].examples)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -80,7 +81,7 @@ def test_view_writes_a_page(capsys, here):
 
 
 def test_scenarios_lists_all(capsys, monkeypatch):
-    monkeypatch.setattr("cdpr_drake.cli.scenarios.load_scenario", cache(load_scenario))
+    monkeypatch.setattr("cdpr_drake.systems.diagrams.load.load_scenario", cache(load_scenario))
     facts = {fact["name"]: fact for fact in told(capsys, "scenarios")}
     assert list(facts) == list(scenario_names())
     assert facts["acrobot_ibvs"]["scheme"] == "ibvs"
@@ -98,7 +99,7 @@ def every_robot():
 @pytest.fixture
 def library(monkeypatch, every_robot):
     """The files are read once."""
-    monkeypatch.setattr("cdpr_drake.cli.robots.load_robot", every_robot.get)
+    monkeypatch.setattr("cdpr_drake.analyses.catalogues.load_robot", every_robot.get)
 
 
 def test_robots_lists_all(capsys, library):
@@ -173,8 +174,8 @@ def test_the_doctor_finds_nothing(capsys):
 def test_the_doctor_compiles_step_by_step(capsys, monkeypatch):
     done = []
     steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
-    for module in ("analyses.installation", "cli.doctor"):
-        monkeypatch.setattr(f"cdpr_drake.{module}.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.default_workers", lambda: 1)
     monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
     found = told(capsys, "doctor", "--compile")
     assert done == [group_names(), "one", "two"]

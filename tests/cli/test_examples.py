@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.cli.app import SUBCOMMANDS
-from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS, groups
-from cdpr_drake.cli.examples import EXAMPLES as FOLDER
-from cdpr_drake.cli.examples import example_names
+from cdpr_drake.analyses.programs import EXAMPLES as FOLDER
+from cdpr_drake.analyses.programs import example_names
+from cdpr_drake.cli.app import OLD
+from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
 from cdpr_drake.systems.controllers.schemes import SCHEMES
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.tensions.methods import METHODS
@@ -220,18 +220,19 @@ def test_they_are_listed_and_copied_and_nothing_is_overwritten(capsys, here):
 
 
 def test_groups_have_every_subcommand_once_with_two_examples_of_itself():
-    named = [name for names in groups().values() for name in names]
-    assert list(SUBCOMMANDS) == named == list(COMMANDS)  # groups are not torn apart
-    assert len({line for _, *lines in COMMANDS.values() for line in lines}) == 2 * len(named)
-    for name, (_, *lines) in COMMANDS.items():
-        assert len(lines) == 2
-        assert all(line.split()[:2] == ["cdpr", name] for line in lines)
+    groups = [command.group for command in COMMANDS.values()]
+    assert groups == sorted(groups, key=groups.index)  # groups are not torn apart
+    examples = [line for command in COMMANDS.values() for line in command.examples]
+    assert len(set(examples)) == 2 * len(COMMANDS)
+    for name, command in COMMANDS.items():
+        assert len(command.examples) == 2
+        assert all(line.split()[:2] == ["cdpr", name] for line in command.examples)
 
 
 def test_the_command_alone_shows_first_steps(capsys):
     code, out, _ = run(capsys)
     assert code == 0
-    for line, words in FIRST_STEPS:
+    for line, words in FIRST_STEPS.items():
         assert line in out
         assert words in out
-        assert line.split()[1] in SUBCOMMANDS
+        assert line.split()[1] in (*COMMANDS, *OLD)

@@ -8,10 +8,11 @@ import pytest
 import yaml
 from scipy.io import loadmat
 
+from cdpr_drake.analyses.frame.files import copy_new
+from cdpr_drake.analyses.programs import NOTEBOOKS
 from cdpr_drake.analyses.visualization.live_view import LiveView
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, page_address
-from cdpr_drake.cli import notebooks as notebook_command
-from cdpr_drake.errors import MeshcatError
+from cdpr_drake.errors import MeshcatError, OutputFolderError
 from cdpr_drake.models.robot_loader import robot_file
 from tests.cli.commands import ended, refuse, run, told
 
@@ -28,7 +29,7 @@ def changed_robot(name, **values):
 
 
 def test_notebooks_are_copied_and_nothing_is_overwritten(capsys, here):
-    notebooks = sorted(path.name for path in notebook_command.FOLDER.glob("*.ipynb"))
+    notebooks = sorted(path.name for path in NOTEBOOKS.glob("*.ipynb"))
     names = [*notebooks, "plain_client.py"]
     assert "tour.ipynb" in notebooks
     assert ended("notebooks", "here/there") == 0
@@ -50,8 +51,8 @@ def test_notebooks_are_copied_and_nothing_is_overwritten(capsys, here):
 
 def test_notebooks_leave_nothing_behind_where_the_disk_is_full(tmp_path, monkeypatch):
     monkeypatch.setattr(type(tmp_path), "mkdir", lambda self, **options: None)
-    with pytest.raises(notebook_command.OutputFolderError, match="cannot be written"):
-        notebook_command.copy_new({"a.ipynb": b"{}"}, tmp_path / "gone")
+    with pytest.raises(OutputFolderError, match="cannot be written"):
+        copy_new({"a.ipynb": b"{}"}, tmp_path / "gone")
 
 
 def test_view_draws_a_robot_that_cannot_be_held(capsys, here):

@@ -13,18 +13,20 @@ import yaml
 
 import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.command_help import COMMANDS, FIRST_STEPS
+from cdpr_drake.cli.command_help import COMMANDS as OLD
+from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
 from tests.analyses.logs.recorders import hangprinter_script, motive
 from tests.cli.commands import refuse
 from tests.messages import printed
 from tests.newcomer import OWN_ROBOT
 
-EXAMPLES = sorted({line for _, *lines in COMMANDS.values() for line in lines})
-EXAMPLES += sorted({line for line, _ in FIRST_STEPS} - set(EXAMPLES))
+EXAMPLES = sorted({line for command in COMMANDS.values() for line in command.examples})
+EXAMPLES += sorted({line for _, *lines in OLD.values() for line in lines})
+EXAMPLES += sorted({*FIRST_STEPS} - set(EXAMPLES))
 
 SESSION = "cdpr_drake.cli.command_session.CommandSession.computing"
 LONG_WORK = {
-    "simulate": [SESSION],
+    "simulate": ["cdpr_drake.cli.sessions.FollowedSession.computing"],
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],
     "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
@@ -45,10 +47,13 @@ LONG_WORK = {
         "cdpr_drake.analyses.front.calibration.identify_log",
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
     ],
-    "scenarios": ["cdpr_drake.cli.scenarios.load_scenario"],
+    "scenarios": ["cdpr_drake.systems.diagrams.load.load_scenario"],
     "study": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "reproduce": ["cdpr_drake.analyses.studies.study.finished_jobs"],
-    "doctor": ["cdpr_drake.cli.doctor.examine", "cdpr_drake.cli.doctor.run_jobs"],
+    "doctor": [
+        "cdpr_drake.analyses.installation.check_rendering",
+        "cdpr_drake.analyses.installation.finished_jobs",
+    ],
 }
 """Where the long work of a command begins: all its arguments are read and accepted there."""
 

@@ -12,7 +12,8 @@ from cdpr_drake.analyses.front.workspaces import compute_workspace
 from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
-from cdpr_drake.cli.option_names import SHARED_OPTIONS, with_options
+from cdpr_drake.cli.option_names import with_options
+from cdpr_drake.cli.simulate import PYTHON_NAMES
 from cdpr_drake.errors import CdprError
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from tests.cli.commands import run
@@ -31,11 +32,11 @@ NOWHERE = "192.0.2.1"
          ["simulate", SCENARIO, "--set", "seed=x", "--set", "a=1"],
          "overrides a: there is no key", "--set a: there is no key"),
         (lambda: simulate(SCENARIO, folder="there"), ["simulate", SCENARIO, "--out", "there"],
-         "allow overwrite", "allow --overwrite"),
+         "overwrite", "--overwrite"),
         (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
-         ["study", "case-9", "--scheduler", "tcp://127.0.0.1:1"],
+         ["study", "case-9", "--workers", "tcp://127.0.0.1:1"],
          "workers: tcp://127.0.0.1:1 does not answer",
-         "--scheduler: tcp://127.0.0.1:1 does not answer"),
+         "--workers: tcp://127.0.0.1:1 does not answer"),
         (lambda: compute_workspace("planar", grid=(2, 2, 1), workers="tcp://127.0.0.1:1"),
          ["workspace", "planar", "--grid", "2,2,1", "--scheduler", "tcp://127.0.0.1:1"],
          "leave out workers", "leave out --scheduler"),
@@ -109,10 +110,10 @@ def test_options_stand_where_arguments_are_named(message, translated):
 
 def test_functions_become_commands():
     words = "finish_run makes log and figures of that folder, continue_run goes on"
-    assert with_options(words, SHARED_OPTIONS) == (
+    assert with_options(words, PYTHON_NAMES) == (
         "cdpr simulate --finish makes log and figures of that folder, "
         "cdpr simulate --continue goes on"
     )
-    assert with_options("or use camera.kind=projected", SHARED_OPTIONS) == (
+    assert with_options("or use camera.kind=projected", PYTHON_NAMES) == (
         "or use --camera projected"
     )

@@ -34,11 +34,11 @@ FOLDERS = ("empty", "acrobot_pbvs", "old")
 QUICK = "--camera projected --duration 0.3"
 TALE = "acrobot_broken_redistributed --compare-reactions 5 --break-time 0.3 --after 0.3"
 NOBODY = "tcp://127.0.0.1:9"
-BAD_FORMAT = "--format: found 'pgn'; accepted: png, pdf, svg, or several with commas"
+BAD_FORMAT = "format: found 'pgn'; accepted: png, pdf, svg, or several with commas"
 
 REFUSED = {
     "": [
-        ("fly", "No such command"),
+        ("fly", "command: found 'fly'; accepted: simulate, serve"),
         ("view foo", "unknown"),
         ("view planar --html no/such/page.html", "no folder"),
         *((f"view acrobot_small --html {name}",
@@ -55,6 +55,7 @@ REFUSED = {
     "simulate": [
         ("foo", "scenario 'foo' is unknown", "acrobot_against_wind", "planar_pbvs"),
         ("nothing.yaml", "nothing.yaml", "no such scenario file"),
+        ("hung.yaml", "found a robot; use a command that takes one, such as cdpr tension"),
         ("bad.yaml", "bad.yaml:3: does not parse as YAML"),
         ("empty", "without scenario.yaml"),
         ("./acrobot_pbvs", "without scenario.yaml"),
@@ -72,44 +73,45 @@ REFUSED = {
         ("--set camera.mount=nose", "camera.mount", "onboard"),
         ("acrobot_pbvs --camera projected --set 'target.pose.position=[-0.5, 0.5, 0]' --out run",
          "its middle would be at (2937, 3134) px"),
-        ("--camera film", "camera.kind", "rendered, projected"),
+        ("--camera film", "--camera: found 'film'", "rendered, projected"),
         ("--duration -1", "duration", "> 0"),
         ("--duration soon", "--duration"),
         ("--seed 1.5", "--seed"),
         ("--out file", "found a file"),
-        ("--out full", "holds files already", "--overwrite"),
+        ("--out full", "holds files already", "or add --overwrite"),
         ("--out file/below", "cannot be written"),
         ("--nonsense", "--nonsense"),
-        (f"{QUICK} --port 7000", "--meshcat only"),
+        (f"{QUICK} --port 7000", "--port: found alone; accepted: with --meshcat"),
         (f"{QUICK} --log-format xlsx", "accepted: some of csv,npz,mat"),
         ("--finish mine", "holds no log"),
         ("--finish nothing", "holds no log"),
         ("--finish no/such/folder", "not there"),
-        ("acrobot_pbvs --camera projected --finish mine", "--finish: accepted with"),
+        ("acrobot_pbvs --camera projected --finish mine",
+         "--camera, scenario: found with --finish"),
         ("--continue nothing", "holds no log"),
         ("--continue no/such/folder", "not there"),
-        ("--continue a --finish a", "--finish: accepted with"),
-        ("acrobot_mobile_robot --continue a", "--continue: accepted with"),
+        ("--continue a --finish a", "--finish: found with --continue"),
+        ("acrobot_mobile_robot --continue a", "scenario: found with --continue"),
         ("--seeds 3:1", "--seeds: found '3:1'; accepted: first:end"),
-        ("--seeds 0:2 --seed 3", "without --seed and --video"),
-        ("--seeds 0:2 --video", "without --seed and --video"),
-        ("--workers 2", "--workers: accepted with --seeds only"),
-        ("acrobot_computed_torque --seeds 0:2", "accepted for visual servos"),
+        ("--seeds 0:2 --seed 3", "--seed: found with --seeds; accepted: without"),
+        ("--seeds 0:2 --video", "--video: found with --seeds; accepted: without"),
+        ("--workers 2", "--workers: found alone; accepted: with --seeds"),
+        ("acrobot_computed_torque --seeds 0:2", "accepted: with visual servos"),
         ("--seeds 0:2 --set initial_pose.position=[0,0,1.1]", "cannot hold"),
         (f"{QUICK} --seeds 1 --workers 1 --out .", "found the working folder or one above it"),
-        (f"{TALE} --duration 3", "--duration: accepted without --compare-reactions"),
-        (f"{TALE} --seeds 0:3", "--seeds: accepted without --compare-reactions"),
+        (f"{TALE} --duration 3", "--duration: found with --compare-reactions"),
+        (f"{TALE} --seeds 0:3", "--seeds: found with --compare-reactions"),
         (f"{TALE} --reactions pray", "--reactions: found 'pray'; accepted: none, stop"),
         (f"{TALE} --break-time 0", "--break-time: found 0; accepted: a number > 0"),
-        ("acrobot_pbvs --after 1", "--after: accepted with --compare-reactions only"),
-        ("--camera projected --out there --format pgn", BAD_FORMAT),
-        ("--camera projected --seeds 0:2 --out there --format pgn", BAD_FORMAT),
-        ("acrobot_computed_torque --out there --format pgn", BAD_FORMAT),
+        ("acrobot_pbvs --after 1", "--after: found alone; accepted: with --compare-reactions"),
+        ("--camera projected --out there --figure-format pgn", BAD_FORMAT),
+        ("--camera projected --seeds 0:2 --out there --figure-format pgn", BAD_FORMAT),
+        ("acrobot_computed_torque --out there --figure-format pgn", BAD_FORMAT),
     ],
     "serve": [
         ("acrobot_computed_torque --place servo", "distributor, controller, trajectory"),
         ("acrobot_pbvs --place controller", "servo, twist"),
-        ("acrobot_computed_torque --pace fast", "remote.pace"),
+        ("acrobot_computed_torque --pace fast", "--pace: found 'fast'"),
         ("acrobot_computed_torque --timeout 0", "remote.timeout"),
         ("acrobot_computed_torque --host no.such.invalid", "--host, --port"),
         ("acrobot_open_loop", "open_loop: found a section with remote"),
@@ -122,7 +124,7 @@ REFUSED = {
         ("scenario mine --robot caroca --from acrobot_pbvs", "accepted: with scenario, alone"),
         ("scenario mine --robot acrobot_smal", "did you mean acrobot_small"),
         ("controler x",
-         "'controler' is unknown; did you mean controller? known: robot, scenario"),
+         "KIND: found 'controler'; did you mean controller? accepted: robot, scenario"),
         ("controller My-Law", "name: found 'My-Law'; accepted: the name of a Python module"),
         ("controller numpy", "name: found 'numpy', an installed module"),
         ("estimator json", "name: found 'json', an installed module"),
@@ -289,12 +291,12 @@ REFUSED = {
         ("acrobot_large --grid 2,2,2 --out there --format pgn", BAD_FORMAT),
     ],
     "study": [
-        *((f"{name} --quick --scheduler {NOBODY}", NOBODY)
+        *((f"{name} --quick --workers {NOBODY}", NOBODY)
           for name in ("worked-examples", "workspaces", "case-9")),
         *((f"fusion --quick --out r {option} {value}", option, value) for option, value in (
             ("--seeds", "5:5"), ("--seeds", "-1"), ("--seeds", "0"), ("--seeds", "1000000000000"),
             ("--workers", "0"), ("--workers", "-3"))),
-        ("case-1 --quick --out there --format pgn", BAD_FORMAT),
+        ("case-1 --quick --out there --figure-format pgn", BAD_FORMAT),
     ],
     "reproduce": [
         ("--only case-88 --out r", "study 'case-88' is unknown; did you mean"),
@@ -303,14 +305,14 @@ REFUSED = {
     ],
     "import-log": [
         ("log.csv --out log.csv --overwrite", "found log.csv, the log itself"),
-        ("log.csv --out x.csv --plot x.bmp", "x.bmp: found the ending .bmp"),
-        ("log.csv --out x.csv --plot x", "x: found no ending; accepted: .png"),
+        ("log.csv --out x.csv --plot x.bmp", "x.bmp: found the ending '.bmp'"),
+        ("log.csv --out x.csv --plot x", "x: found the ending ''; accepted: png"),
         ("log.csv --out x.csv --plot no/x.png", "there is no folder no"),
-        ("log.csv --out x.csv --rate -5", "--rate: found -5; accepted: above 0"),
-        ("log.csv --out x.csv --rate nan", "--rate: found nan; accepted: above 0"),
+        ("log.csv --out x.csv --rate -5", "--rate: found '-5'; accepted: above 0"),
+        ("log.csv --out x.csv --rate nan", "--rate: found 'nan'; accepted: above 0"),
         ("log.csv --out x.csv --from 5", "found no rows from 5 s; accepted: a part"),
         ("log.csv --out x.csv --unit mm", "accepted: DIMENSION=UNIT, as length=mm"),
-        ("log.csv --out x.csv --every 0", "--every: found '0'; accepted: at least 1"),
+        ("log.csv --out x.csv --every 0", "--every: found '0'; accepted: a whole number, at least"),
         ("log.csv --out x.csv --every few", "found 'few'; accepted: a whole number"),
         ("log.csv --out x.csv --from dawn", "--from: found 'dawn'; accepted: a number"),
         ("empty.csv --out x.csv", "empty.csv: found an empty file; accepted: a log"),
@@ -456,12 +458,12 @@ def test_names_that_are_not_close_are_only_listed():
 
 
 def raising(problem):
-    """Stands for `app.make_app`."""
+    """Stands for `call.run`."""
 
-    def call(**options):
+    def run(*arguments):
         raise problem
 
-    return lambda arguments: call
+    return run
 
 
 @pytest.mark.parametrize(
@@ -479,7 +481,7 @@ def raising(problem):
 )
 def test_what_drake_or_python_raise_is_one_line(problem, monkeypatch, capsys):
     monkeypatch.delenv(app.TRACEBACK, raising=False)
-    monkeypatch.setattr(app, "make_app", raising(problem))
+    monkeypatch.setattr("cdpr_drake.cli.call.run", raising(problem))
     refuse(capsys, "robots")
 
 
@@ -488,6 +490,6 @@ def test_mistakes_of_this_program_can_be_found(mistake, monkeypatch):
     monkeypatch.delenv(app.TRACEBACK, raising=False)
     if isinstance(mistake, RuntimeError):  # for which a variable lets it through
         monkeypatch.setenv(app.TRACEBACK, "1")
-    monkeypatch.setattr(app, "make_app", raising(mistake))
+    monkeypatch.setattr("cdpr_drake.cli.call.run", raising(mistake))
     with pytest.raises(type(mistake)):
         app.main(["robots"])

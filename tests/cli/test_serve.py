@@ -15,8 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.cli.process import INTERRUPTED
-from cdpr_drake.cli.run_endings import CLIENT_ENDED
+from cdpr_drake.cli.process import CLIENT_ENDED, INTERRUPTED
 from cdpr_drake.systems.remote.remote_client import RemoteClient
 from tests.cli.commands import ended, refuse
 from tests.cli.conftest import only

@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame import words as argument_words
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
 from cdpr_drake.analyses.simulation.start_checks import limit_warnings, servo_limit_warnings
 from cdpr_drake.analyses.simulation.unexpected_end import slack_words, unexpected_end
-from cdpr_drake.cli.options import parse_formats
-from cdpr_drake.cli.simulate import parse_seeds
-from cdpr_drake.errors import CdprError, ScenarioError
+from cdpr_drake.cli.simulate import seeds_of
 from cdpr_drake.kernel_cache.kernel_list import needed_kernels
 from cdpr_drake.models import rendered_camera
 from cdpr_drake.models.mechanism_loader import load_mechanism
@@ -96,19 +95,19 @@ def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, here, monkeyp
      ("png,png", ("png",))],
 )  # fmt: skip
 def test_formats_are_accepted_alone_and_together(words, formats):
-    assert parse_formats(words) == formats
+    assert tuple(argument_words.formats(words)) == formats
 
 
 @pytest.mark.parametrize("words", ["", "jpg", "png,", "png pdf", "../png", "png,eps"])
-def test_other_formats_are_refused_with_what_is_accepted(words):
-    with pytest.raises(CdprError, match=r"--format: found '.*'; accepted: png, pdf, svg"):
-        parse_formats(words)
+def test_other_formats_are_refused_with_what_is_accepted(words, capsys):
+    said = refuse(capsys, "simulate", f"--figure-format={words}")
+    assert f"--figure-format: found {words!r}; accepted: png, pdf, svg" in said
 
 
 def test_figures_have_the_formats_asked_for(here):
     words = ("simulate", "planar_pbvs", "--camera", "projected", "--duration", "0.1")
     with only("tensions.pdf", "tensions.svg", ".png", "replay.html"):
-        assert ended(*words, "--out", "o", "--format", "pdf,svg") == 0
+        assert ended(*words, "--out", "o", "--figure-format", "pdf,svg") == 0
     figures = {name for name in os.listdir("o") if name.endswith((".png", ".pdf", ".svg", ".html"))}
     assert figures == {"tensions.pdf", "tensions.svg", "replay.html"}
 
@@ -191,6 +190,11 @@ def test_ctrl_c_keeps_what_was_simulated(capsys, here, monkeypatch):
 
 
 @pytest.mark.usefixtures("without_pictures")
+def test_the_end_of_a_duration_that_was_asked_for_is_no_timeout(capsys, here, without_pictures):
+    words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--out", "o", "--duration", "0.1")
+    assert "acrobot_pbvs: ended at 0.1 s, as asked" in run(capsys, *words)[1]
+
+
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
     words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.6", *COMPILED)
     code, out, _ = run(capsys, *words, "--out", "out")
@@ -292,15 +296,14 @@ def test_limits_of_winches_by_torque_and_of_mechanisms_are_said():
     ("words", "seeds"), [("0:3", [0, 1, 2]), ("5:6", [5]), ("4", [4]), ("3,5,8", [3, 5, 8])]
 )
 def test_seeds_as_spans_and_lists(words, seeds):
-    assert parse_seeds(words) == seeds
+    assert seeds_of(words) == seeds
 
 
 @pytest.mark.parametrize(
     "words", ["", "3:3", "5:2", "1:2:3", "-1:2", "1,1", "a", "1.5", "0:9999999999", "9999999999"]
 )
-def test_other_seeds_are_refused(words):
-    with pytest.raises(ScenarioError, match="accepted: first:end"):
-        parse_seeds(words)
+def test_other_seeds_are_refused(words, capsys):
+    assert "accepted: first:end" in refuse(capsys, "simulate", f"--seeds={words}")
 
 
 MANY = ("simulate", "--camera", "projected", "--workers", "1", "--seeds")

@@ -92,7 +92,7 @@ def test_a_study_of_the_table_is_a_command(run, here):
 
 def test_a_figure_that_fails_is_named_and_costs_no_other(run, toy, here):
     toy(figures={"first": no_line, "good": line})
-    code, _, err = run(*STUDY, "--format", "png,svg")
+    code, _, err = run(*STUDY, "--figure-format", "png,svg")
     assert code == 3
     assert "cdpr: r/first.png: not written: no such colour\n" in err
     assert squares(here / "r") == [0.0, 1.0, 4.0, 9.0]

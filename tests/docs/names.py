@@ -13,7 +13,7 @@ from typing import Any
 from setuptools import find_packages
 
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns
-from cdpr_drake.cli.schema import FILES, file_schema
+from cdpr_drake.analyses.templates import FILES, file_schema
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.session import Workbench
@@ -64,7 +64,7 @@ def key_paths() -> frozenset[str]:
                     walk(part, above)
 
     for kind in FILES:
-        walk(file_schema(kind), ())
+        walk(file_schema(kind).schema, ())
     return frozenset(found)
 
 

@@ -82,7 +82,7 @@ def _wide() -> dict[str, str]:
 
 def study_names() -> list[str]:
     """Names of all studies, from the help of `cdpr study`."""
-    found = re.search(r"Which study: (.*?)\.\s", command("study", "--help"))
+    found = re.search(r"Which study[:.] (?:\[choices: )?(.*?)[].]", command("study", "--help"))
     if found is None:
         raise SystemExit("cdpr study --help does not list the studies any more")
     return [word.strip() for word in found[1].split(",")]

@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdpr_drake.cli.check import checked
+from cdpr_drake.analyses.checks import check_files
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_in_plant import platform_inertia
@@ -334,7 +334,7 @@ def test_points_outside_frame_and_platform_are_remarked(tmp_path):
     assert beyond.startswith(words)
     path = tmp_path / "robot.yaml"
     path.write_text(yaml.safe_dump(changed(**off), sort_keys=False))
-    assert checked(path)["notes"][:2] == [outside, beyond]
+    assert check_files([path]).files[0].notes[:2] == [outside, beyond]
     assert point_notes(robot(**off, frame__assumed=True)) == [beyond]
 
 

@@ -45,7 +45,7 @@ def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
     assert again.perturbations.believed_robot == str(out / BELIEVED_FILE)
     assert {path.stem for path in out.glob("*.png")} == {"calibration", "correlation"}
     assert "servo, calibrated" in repr(found)
-    with pytest.raises(OutputFolderError, match="allow overwrite"):
+    with pytest.raises(OutputFolderError, match="add overwrite"):
         calibrate_in_simulation(scenario, 8, folder=out)
 
 

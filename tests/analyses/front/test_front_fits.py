@@ -59,7 +59,7 @@ def test_a_calibration(planar, tmp_path):
     assert kept.folder == out
     assert {path.name for path in out.glob("*.svg")} == {"calibration.svg", "correlation.svg"}
     assert json.loads((out / "results.json").read_text()) == as_json(kept)
-    one_line(lambda: cdpr.calibrate(planar, path, asked, folder=out), "allow overwrite")
+    one_line(lambda: cdpr.calibrate(planar, path, asked, folder=out), "add overwrite")
     one_line(lambda: cdpr.calibrate(planar, path, asked, propose=0), "propose: found 0")
     one_line(lambda: cdpr.calibrate(planar, path, asked, sigmas={"length": 1.0}), "lengths")
     one_line(lambda: cdpr.calibrate(planar, path, asked, prior={}), "prior", "priors")

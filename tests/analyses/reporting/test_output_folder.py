@@ -205,7 +205,7 @@ def test_overwrite_replaces_at_the_end(tmp_path):
 @pytest.mark.parametrize(
     ("prepared", "name", "overwrite", "words"),
     [
-        (results_folder, "out", False, "allow overwrite"),
+        (results_folder, "out", False, "add overwrite"),
         (results_folder, "thesis", True, "did not write"),
         (continued_folder, "thesis", True, "did not write"),
         (results_folder, "link", True, "did not write"),

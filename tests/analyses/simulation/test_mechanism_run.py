@@ -258,5 +258,5 @@ def test_check_and_new_know_the_kind(capsys, tmp_path, monkeypatch):
     assert set(scenario_names("mechanism")) == {ARM, BASES}
     assert run(capsys, "new", "scenario", "mine", "--from", BASES)[0] == 0
     code, out, _ = run(capsys, "check", "mine.yaml")
-    assert (code, out.strip()) == (0, "mine.yaml: scenario: nothing wrong")
+    assert (code, out.strip()) == (0, "mine.yaml: valid scenario")
     assert "# " in (tmp_path / "mine.yaml").read_text()

@@ -11,8 +11,8 @@ from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.simulation.worlds import world_facts
+from cdpr_drake.analyses.templates import file_schema
 from cdpr_drake.analyses.visualization.replay import RobotPicture
-from cdpr_drake.cli.schema import file_schema
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -297,7 +297,7 @@ def test_a_platform_is_set_down_on_ground_that_is_level_with_the_frame():
 
 
 def test_schemas_know_the_world():
-    schema, parts = file_schema("scenario"), []
+    schema, parts = file_schema("scenario").schema, []
     while "then" in schema:
         parts.append(schema["then"])
         schema = schema["else"]

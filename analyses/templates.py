@@ -1,27 +1,31 @@
-"""`cdpr new`: a commented file to start from, or a block or study with its test."""
+"""Files to start from: robots, scenarios, blocks, studies; notebooks; examples."""
 
 from __future__ import annotations
 
 import keyword
 import re
 import sys
+from dataclasses import dataclass
 from importlib.metadata import packages_distributions
+from json import dumps
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from cyclopts import Parameter
 
-from cdpr_drake.cli.completion import robot_words, words_among
-from cdpr_drake.cli.notebooks import FOLDER as NOTEBOOKS
-from cdpr_drake.cli.robot_folder import write_files
-from cdpr_drake.cli.terminal import message_console
-from cdpr_drake.errors import CdprError, plain_words
+from cdpr_drake.analyses.frame.files import WrittenFiles, write_files
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import NewFolder, RobotWord, one_of
+from cdpr_drake.analyses.programs import NOTEBOOKS
+from cdpr_drake.errors import CdprError
 from cdpr_drake.models.exit_points import split_name
+from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_text
+from cdpr_drake.schema.json_schemas import json_schema
 from cdpr_drake.schema.templates import commented_yaml
-from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.systems.diagrams.first_scenario import first_scenario
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario
@@ -39,62 +43,57 @@ BLOCKS = ("controller", "estimator", "study")
 """What there is a template of, each with its test."""
 
 KINDS = (ROBOT, SCENARIO, *BLOCKS)
+
+FILES = (ROBOT, "mechanism", SCENARIO)
+"""Kinds of files that have a schema."""
+
 TEMPLATES = NOTEBOOKS / "templates"
-EXAMPLE = "acrobot_large"
+
+EXAMPLE_ROBOT = "acrobot_large"
 """The robot that a new one begins as."""
 
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
 
 
-def new(
-    kind: Annotated[
-        str,
-        typer.Argument(help=f"One of {', '.join(KINDS)}.", autocompletion=words_among(KINDS)),
-    ],
-    name: Annotated[
-        str, typer.Argument(help="Name; the file is NAME.yaml, or NAME.py and test_NAME.py.")
-    ],
-    source: Annotated[
-        str | None,
-        typer.Option(
-            "--from", help=f"Robot or scenario to copy; default: {EXAMPLE} or {DEFAULT_SCENARIO}."
-        ),
-    ] = None,
-    robot: Annotated[
-        str | None,
-        typer.Option(
-            help="With scenario: a robot by name or file, for which poses, target and limits are "
-            "chosen.",
-            autocompletion=robot_words,
-        ),
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder for the file.")] = Path(),
-    overwrite: Annotated[bool, typer.Option(help="Replace a file of that name.")] = False,
-) -> None:
+@verb()
+def write_template(
+    kind: Annotated[str, one_of(KINDS)], name: str, /, *,
+    source: Annotated[str | None, Parameter(name="--from")] = None, robot: RobotWord = None,
+    out: NewFolder = Path(), overwrite: bool = False,
+) -> WrittenFiles:  # fmt: skip
     """Writes a robot, scenario, controller, estimator or study to start from.
 
     A robot or scenario file has every key with its meaning, unit and range; keys with a default
     are comments. A scenario for a robot, `--robot`, has the keys that it needs; `cdpr schema
     scenario` lists all. A controller, estimator or study is a program that runs, with a test for
     pytest.
+
+    Args:
+        kind: What to write.
+        name: Name; the file is NAME.yaml, or NAME.py and test_NAME.py.
+        source: Robot or scenario to copy; default: acrobot_large or the scenario that cdpr simulate
+            runs.
+        robot: With scenario: a robot by name or file, for which poses, target and limits are
+            chosen.
+        out: Folder for the file.
+        overwrite: Replace a file of that name.
+
+    Raises:
+        CdprError: The name or an argument is not accepted.
+        OutputFolderError: The file is there, or cannot be written.
     """
     if not _NAME.fullmatch(name):
         raise CdprError(
             f"name: found {name!r}; accepted: 1 to 64 letters, digits, '_', '.' or '-', not "
             "beginning with '.'"
         )
-    if kind not in KINDS:
-        raise CdprError(f"kind of file {kind!r} is unknown; {closest(kind, KINDS)}")
     if robot is not None and (kind != SCENARIO or source is not None):
-        found = kind if source is None else f"--from {source}"
-        raise CdprError(f"--robot: found {robot} with {found}; accepted: with scenario, alone")
+        beside = kind if source is None else f"--from {source}"
+        raise CdprError(f"robot: found {robot} with {beside}; accepted: with scenario, alone")
     if kind in BLOCKS:
         if source is not None:
-            raise CdprError(f"--from: found {source} with {kind}; accepted: with robot, scenario")
-        for path in write_files(out, _block(kind, name), overwrite):
-            print(plain_words(str(path)))
-        return
-    of_robot = kind == ROBOT
+            raise CdprError(f"source: found {source} with {kind}; accepted: with robot, scenario")
+        return WrittenFiles({"kind": kind}, write_files(out, _block(kind, name), overwrite))
     remarks: list[str] = []
     head = f"# Check it with `cdpr check {name}.yaml`.\n"
     if robot is not None:
@@ -102,25 +101,21 @@ def new(
         content, remarks = first_scenario(loaded, name, _reference(robot, out))
         schema = SCENARIO_SCHEMAS[content.get("kind", VISUAL_SERVO)][0]
         head += f"# Made for {loaded.name}. All other keys: `cdpr schema scenario`.\n"
+    elif kind == ROBOT:
+        source = source or EXAMPLE_ROBOT
+        load_robot(source, "cdpr new")  # for its message, where there is none
+        schema, content = Robot, _read(source, robot_text(source))
     else:
-        schema, content = (
-            _robot(source or EXAMPLE) if of_robot else _scenario(source or DEFAULT_SCENARIO)
-        )
-        content["name"] = name
+        schema, content = _scenario(source or DEFAULT_SCENARIO)
+    content["name"] = name
     text = head + commented_yaml(schema, content, every=robot is None)
-    (path,) = write_files(out, {f"{name}.yaml": text}, overwrite)
-    (load_robot if of_robot else load_scenario)(str(path))
-    for words in remarks:
-        message_console().print(words, soft_wrap=True, markup=False, highlight=False)
-    print(plain_words(str(path)))
+    paths = write_files(out, {f"{name}.yaml": text}, overwrite)
+    (load_robot if kind == ROBOT else load_scenario)(str(paths[0]))
+    return WrittenFiles({"kind": kind}, paths, remarks)
 
 
 def _block(kind: str, name: str) -> dict[str, str]:
-    """Program and test of a block, under its name.
-
-    Raises:
-        CdprError: It is no name of a module.
-    """
+    """Program and test of a block, under its name."""
     if not name.isidentifier() or keyword.iskeyword(name) or name.lower() != name:
         raise CdprError(
             f"name: found {name!r}; accepted: the name of a Python module, of small letters, "
@@ -140,18 +135,13 @@ def _block(kind: str, name: str) -> dict[str, str]:
     return files
 
 
-def _robot(source: str) -> tuple[type, dict[str, Any]]:
-    load_robot(source, "cdpr new")  # for its message, where there is none
-    return Robot, _read(source, robot_text(source))
-
-
 def _read(source: object, text: str) -> dict[str, Any]:
-    """What a text says that was accepted before, though perhaps not word by word."""
+    """Content of a text that was accepted before, though perhaps not word by word."""
     try:
-        found: dict[str, Any] = load_yaml(text)
+        content: dict[str, Any] = load_yaml(text)
     except YamlTextError as problem:
         raise CdprError(problem.at(source)) from problem
-    return found
+    return content
 
 
 def _reference(robot: str, out: Path) -> str:
@@ -174,3 +164,52 @@ def _scenario(source: str) -> tuple[type, dict[str, Any]]:
         if obstacle.get("file") is not None:
             obstacle["file"] = found_file(str(obstacle["file"]), path.parent)
     return SCENARIO_SCHEMAS[scenario_kind(source)][0], content
+
+
+@dataclass(frozen=True, repr=False)
+class FileSchema(Result):
+    """The JSON schema of files of a kind.
+
+    Attributes:
+        schema: The schema.
+    """
+
+    schema: dict[str, Any]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The schema."""
+        return self.schema
+
+    def tables(self) -> list[Table]:
+        """None."""
+        return []
+
+    def lines(self) -> list[str]:
+        """The schema as JSON."""
+        return [dumps(self.schema, indent=2)]
+
+
+@verb()
+def file_schema(kind: Annotated[str, one_of(FILES)], /) -> FileSchema:
+    """Prints the JSON schema of robot, mechanism or scenario files, for editors.
+
+    Args:
+        kind: Which files; of scenarios, the schema asks for what the `kind` in the file needs.
+    """
+    if kind != SCENARIO:
+        schema = json_schema(Robot if kind == ROBOT else Mechanism, f"{kind} of cdpr_drake")
+        return FileSchema(schema)
+    kinds = {
+        name: json_schema(schema, f"scenario of cdpr_drake, {name}")
+        for name, (schema, _) in SCENARIO_SCHEMAS.items()
+    }
+    dialect = next(iter(kinds.values()))["$schema"]
+    first, *others = [
+        (name, {key: value for key, value in of_kind.items() if key != "$schema"})
+        for name, of_kind in kinds.items()
+    ]
+    schema = first[1]
+    for name, other in others:
+        condition = {"properties": {"kind": {"const": name}}, "required": ["kind"]}
+        schema = {"if": condition, "then": other, "else": schema}
+    return FileSchema({"$schema": dialect, "title": "scenario of cdpr_drake", **schema})

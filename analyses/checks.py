@@ -1,0 +1,190 @@
+"""Files that users write: everything that is wrong with them, and what a user may want to know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.front.logs import ImportedLog, import_log
+from cdpr_drake.analyses.logs.log_formats import detect_log
+from cdpr_drake.errors import CdprError, meant_names
+from cdpr_drake.models.formats.file_kinds import is_foreign
+from cdpr_drake.models.formats.grab_mat import is_grab_mat
+from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
+from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.robot_exchange import import_robot
+from cdpr_drake.models.robot_holding import hold_robot
+from cdpr_drake.models.robot_loader import (
+    load_robot,
+    names_mechanism,
+    point_notes,
+    robot_file,
+    robot_names,
+)
+from cdpr_drake.schema.input_files import input_text
+from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+WRONG = 2
+"""Exit code if something is wrong with a file."""
+
+LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".py")
+"""Endings of files that may be logs; a reader has to know what is in them, too."""
+
+
+class CheckedFile(NamedTuple):
+    """What is wrong with a file.
+
+    Attributes:
+        file: The file, as the user named it.
+        kind: What it is, in words; None if something is wrong.
+        problems: What is wrong, a line each.
+        notes: What a user may want to know of it.
+        log: What was read, if it is a log.
+    """
+
+    file: str
+    kind: str | None
+    problems: Sequence[str] = ()
+    notes: Sequence[str] = ()
+    log: ImportedLog | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class CheckedFiles(Result):
+    """All that is wrong with some files.
+
+    Attributes:
+        files: What is said of each.
+    """
+
+    files: Sequence[CheckedFile]
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """A list, an entry each."""
+        return [
+            {"file": file.file, "kind": file.kind, "problems": list(file.problems),
+             "notes": list(file.notes)}
+            for file in self.files
+        ]  # fmt: skip
+
+    def tables(self) -> list[Table]:
+        """None."""
+        return []
+
+    def lines(self) -> list[str]:
+        """Problems and notes."""
+        lines: list[str] = []
+        for file in self.files:
+            lines += file.problems or [f"{file.file}: valid {file.kind}"]
+            lines += [f"  note: {note}" for note in file.notes]
+        return lines
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """The log, if one log was checked."""
+        log = self.files[0].log if len(self.files) == 1 else None
+        return {} if log is None else {"log": log.plot}
+
+    @property
+    def exit_code(self) -> int:
+        """2 if something is wrong."""
+        return WRONG if any(file.problems for file in self.files) else 0
+
+
+@verb()
+def check_files(files: Sequence[Path], /) -> CheckedFiles:
+    """Checks files of robots, mechanisms, scenarios; lists every problem; then exit code 2.
+
+    For a log it says which reader reads it and what it contains: rows, gaps, columns, units. What
+    the log does not state, cdpr import-log takes as options.
+
+    Args:
+        files: Robot or scenario files or names, files of other tools, or logs.
+    """
+    return CheckedFiles([_checked(path) for path in files])
+
+
+def _checked(path: Path) -> CheckedFile:
+    try:
+        return _read(path, _file_of(path))
+    except CdprError as problem:
+        return CheckedFile(str(path), None, str(problem).split("\n"))
+
+
+def _read(named: Path, path: Path) -> CheckedFile:
+    """What a file is; raises what is wrong with it."""
+    name = str(named)
+    if is_log(path):
+        log = import_log(path)
+        first, *notes = log.lines()
+        kind = "log, " + first.removeprefix(f"{path}: ")
+        return CheckedFile(name, kind, notes=[note.strip() for note in notes], log=log)
+    if is_foreign(path):
+        imported = import_robot(path)
+        assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
+        notes = [*assumed, *imported.completed.remarks, *point_notes(imported.robot)]
+        return CheckedFile(name, f"robot, {imported.tool}", notes=notes)
+    if _is_scenario(path):
+        load_scenario(str(path))
+        return CheckedFile(name, "scenario")
+    if names_mechanism(path):
+        return CheckedFile(name, "mechanism", notes=_mechanism_notes(path))
+    robot = load_robot(str(path))
+    notes = point_notes(robot)
+    try:
+        hold_robot(robot, robot.home.transform(), robot.cable_set(), "elastic")
+    except CdprError as problem:
+        notes.append(f"the home pose: {problem}")
+    return CheckedFile(name, "robot", notes=notes)
+
+
+def _file_of(path: Path) -> Path:
+    """A file, or the one of the robot or scenario of this name."""
+    if path.exists():
+        return path
+    name = str(path)
+    robots, scenarios = robot_names(), scenario_names()
+    if name in robots:
+        return robot_file(name)
+    if name in scenarios:
+        return scenario_file(name)
+    hint = "".join(f"; did you mean {near}?" for near in meant_names(name, (*robots, *scenarios)))
+    raise CdprError(f"{path}: there is no such file, robot or scenario{hint}")
+
+
+def is_log(path: Path) -> bool:
+    """True if a file is a log of a machine: by its ending, and by a reader that knows it."""
+    if path.suffix.lower() not in LOG_SUFFIXES or not path.is_file() or is_grab_mat(path):
+        return False
+    return detect_log(path) is not None
+
+
+def _mechanism_notes(path: Path) -> list[str]:
+    from cdpr_drake.analyses.statics.static import MechanismAtRest, solve_static
+
+    mechanism = load_mechanism(path)
+    try:
+        hanging = solve_static(mechanism)
+    except CdprError as problem:
+        return [f"the home positions: {problem}"]
+    assert isinstance(hanging, MechanismAtRest)
+    falls = hanging.rest.stability != "stable"
+    return [*hanging.rest.notes, *([f"at home it is {hanging.rest.stability}"] if falls else [])]
+
+
+def _is_scenario(path: Path) -> bool:
+    try:
+        content = None if too_many_bytes(path) else load_yaml(input_text(path))
+    except (OSError, ValueError):
+        return False  # the reader of robots says what is wrong
+    if not isinstance(content, dict):
+        return False
+    return "robot" in content or (MECHANISM_KEY in content and SCENARIO_KEY in content)
