@@ -1,8 +1,9 @@
+from .analyses.design.optimization import optimize_design as optimize_design
+from .analyses.design.reconfiguration import reconfigure as reconfigure
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
-from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.environments import environment_names as environment_names
 from .analyses.front.environments import make_environment as make_environment
 from .analyses.front.exchange import import_robot as import_robot
@@ -12,10 +13,6 @@ from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
 from .analyses.front.mechanisms import hang_mechanism as hang_mechanism
 from .analyses.front.mechanisms import solve_mechanism_tensions as solve_mechanism_tensions
-from .analyses.front.planning import plan_free_motion as plan_free_motion
-from .analyses.front.planning import plan_path as plan_path
-from .analyses.front.proven_motions import plan_proven_motion as plan_proven_motion
-from .analyses.front.reconfiguration import reconfigure as reconfigure
 from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
@@ -34,6 +31,9 @@ from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
 from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .analyses.logs.log_request import LogRequest as LogRequest
+from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
+from .analyses.planning.path_plan import plan_path as plan_path
+from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case
 from .analyses.studies.study import Form as Form

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.benchmarks.moving_obstacles import timed_cells_row
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
-from cdpr_drake.analyses.planning.plan_results import PlanRun
+from cdpr_drake.analyses.planning.path_plan import PathMotion
 from cdpr_drake.analyses.planning.robot_path_task import (
     RESERVE,
     LimitSettings,
@@ -111,9 +111,9 @@ def stream_row(repeats: int) -> TimingRow:
     poses = [pose_from_angles(np.array(place), np.zeros(3)) for place in places]
     robot, given = load_robot(STREAMED), LimitSettings(cable_speed=0.05, reserve=RESERVE)
     task, path = path_task(robot, given), make_path(robot, poses, "smooth")
-    run = PlanRun(
+    run = PathMotion(
         robot=robot, limits=robot_limits(robot, given), arguments={}, planning_time=0.0,
-        plan=plan_along_path(task, path, STATIONS), source="three places",
+        solution=plan_along_path(task, path, STATIONS), source="three places",
     )  # fmt: skip
     stream = cable_stream(run, 100.0)
     works = [

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -154,8 +153,3 @@ def between(grid: WorkspaceGrid) -> WorkspaceGrid:
     counts = [1 if n == 1 else n + 1 for n in grid.shape[1:]]
     half = np.array([0.25 * (axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in grid.axes])
     return grid_by_count(lower + half, upper - half, counts, [tuple(a) for a in grid.angles])
-
-
-def design_file(folder: Path) -> Path:
-    """Where the robot file of a design is, in a results folder."""
-    return folder / "design" / "robot.yaml"

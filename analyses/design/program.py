@@ -13,7 +13,6 @@ from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
-from cdpr_drake.analyses.design.maximin import SLOPES, Slopes
 from cdpr_drake.analyses.design.search import (
     DesignSearch,
     evaluate_original,
@@ -21,12 +20,9 @@ from cdpr_drake.analyses.design.search import (
     scores_of,
     search_design,
 )
+from cdpr_drake.analyses.design.search_methods import SLOPES, Slopes
 from cdpr_drake.analyses.design.settings import DesignSettings
-from cdpr_drake.analyses.reporting.progress import (
-    NOBODY_FOLLOWS,
-    WorkProgress,
-    WorkSession,
-)
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError, accepted_names
@@ -63,9 +59,9 @@ class DesignProgram(OwnTerms):
     motor_torque [N m]. Costs count beside the goals' weighted sum with the sign changed, in which
     every goal is relative to the robot as it is.
 
-    A goal that is the least of smooth functions over the poses, of `maximin.SLOPES`, enters as
-    such, with exact slopes; others by differences. With nothing added `Solve` is `search_design`.
-    With own terms SNOPT seeks from the present robot.
+    A goal that is the least of smooth functions over the poses, of `search_methods.SLOPES`, enters
+    as such, with exact slopes; others by differences. With nothing added `Solve` is
+    `search_design`. With own terms SNOPT seeks from the present robot.
 
     Attributes:
         robot: The robot, or its name or path.
@@ -175,17 +171,17 @@ class DesignProgram(OwnTerms):
         binding = self._prog.AddCost(_CostOf(_ByDifferences(cost)), vars=self._z)
         return self._named(binding, "cost", name or ", ".join(asked))
 
-    def Solve(self, session: WorkSession = NOBODY_FOLLOWS) -> DesignSearch:
+    def Solve(self, follow: Follow = NOBODY) -> DesignSearch:
         """The design: two are in the result with own terms, the present robot and what was found.
 
         Args:
-            session: Of a search without own terms.
+            follow: Who follows a search without own terms.
 
         Raises:
             CdprError: As `search_design`; no design keeps the own constraints.
         """
         if not self.has_own_terms:
-            return search_design(self.robot, self.candidates, self.settings, session)
+            return search_design(self.robot, self.candidates, self.settings, follow=follow)
         start = np.zeros(self._prog.num_vars())
         places = self._prog.FindDecisionVariableIndices(self._z)
         start[places] = self._present()
@@ -200,12 +196,11 @@ class DesignProgram(OwnTerms):
             evaluate_goals(self.candidates.robot(self.number, one), self.judging, self._goals)
             for one in designs
         ])  # fmt: skip
-        done = WorkProgress(said, 2, 2, 0.0, rate="designs/s", items="designs")
         return DesignSearch(
             self.candidates, self.settings, self.judging, self._original,
             np.full(2, self.number), designs, values,
-            scores_of(values, self._original, self.settings), done,
-            self._report(x, solver, said, (LOCAL,)),
+            scores_of(values, self._original, self.settings),
+            program=self._report(x, solver, said, (LOCAL,)),
         )  # fmt: skip
 
     def _add_goal(self, goal: str, weight: float) -> None:

@@ -86,10 +86,8 @@ class Result(ABC):
         from rich.table import Table as Drawn
 
         for table in self.tables():
-            drawn = Drawn(
-                title=table.title, box=SIMPLE_HEAD, pad_edge=False, title_justify="left",
-                show_header=bool(table.headings),
-            )  # fmt: skip
+            console.print(table.title, soft_wrap=True)  # a table would break it at its own width
+            drawn = Drawn(box=SIMPLE_HEAD, pad_edge=False, show_header=bool(table.headings))
             for k in range(max(map(len, (table.headings, *table.rows)), default=0)):
                 right = bool(table.headings) and all(_is_number(row[k]) for row in table.rows)
                 heading = table.headings[k] if table.headings else ""

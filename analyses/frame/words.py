@@ -49,9 +49,7 @@ def words(
     def convert(_kind: Any, tokens: Sequence[Token]) -> Any:
         return [value(token) for token in tokens] if many else value(tokens[0])
 
-    return Parameter(
-        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer
-    )
+    return Parameter(name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer)
 
 
 def numbers(*sizes: int, by: str = ",") -> Callable[[str], Array]:
@@ -207,3 +205,41 @@ def one_of(known: Mapping[str, Any] | Sequence[str]) -> Parameter:
 def is_number(value: object) -> bool:
     """False for a float that is no number or not finite, as nan and inf on a command line."""
     return not isinstance(value, float) or math.isfinite(value)
+
+
+class Word(str):
+    """A word of a command line with its value, for results that tell what was asked.
+
+    Attributes:
+        value: What it means.
+    """
+
+    value: Any
+
+
+def with_word(parse: Callable[[str], Any]) -> Callable[[str], Word]:
+    """Makes a `Word` of a word that `parse` accepts."""
+
+    def keep(word: str) -> Word:
+        result = Word(word)
+        result.value = parse(word)
+        return result
+
+    return keep
+
+
+def value_of(given: Any) -> Any:
+    """The value of a `Word`; of anything else, itself."""
+    return given.value if isinstance(given, Word) else given
+
+
+def poses(word: str) -> list[Any]:
+    """Poses X_WP with ; between them."""
+    return [pose(part) for part in word.split(";") if part.strip()]
+
+
+Switch: TypeAlias = Annotated[bool, Parameter(negative=())]
+"""An option without a value, which is off by default."""
+
+InputFile: TypeAlias = Annotated[Any, words(Path, "the path of a file", "FILE")]
+"""A file; in Python what it holds, too."""

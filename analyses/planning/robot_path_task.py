@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.errors import (
     PlanningError,
     RobotFileError,
     TensionProblemError,
+    WrenchSetError,
     accepted_names,
 )
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
@@ -55,9 +60,7 @@ class LimitSettings:
         cable_acceleration: Largest acceleration of a cable [m/s^2].
         speed: Largest speed of Po [m/s].
         reserve: Share of all limits that is left to feedback, see `MotionLimits.within`. None:
-            `RESERVE` in plans, such as those of `plan_path`; nothing in a task for constraints of
-            one's own, `path_task`.
-        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
+            nothing.
     """
 
     tensions: tuple[float, float] | None = None
@@ -65,7 +68,17 @@ class LimitSettings:
     cable_acceleration: float | None = None
     speed: float | None = None
     reserve: float | None = None
-    feeds: bool = True
+
+    def as_dict(self, pulleys: bool) -> dict[str, Any]:
+        """For JSON, with the geometry of the cables that is planned with."""
+        return {
+            "limits_n": self.tensions,
+            "cable_speed_m_s": self.cable_speed,
+            "cable_acceleration_m_s2": self.cable_acceleration,
+            "speed_m_s": self.speed,
+            "reserve": self.reserve,
+            "pulleys": pulleys,
+        }
 
 
 def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
@@ -136,6 +149,30 @@ def path_task(
     corners = np.zeros((len(found), 6))
     corners[:, list(dynamics.motions)] = found
     return PathTask(cables, dynamics, limits, names, corners)
+
+
+def robot_task(
+    robot: Robot, given: LimitSettings, pulleys: bool, resist: SpatialSet | Path | str | None = None
+) -> PathTask:
+    """The robot as it is planned with; `resist` is a set of wrenches, or its file.
+
+    Raises:
+        CdprError: As `path_task`; the file cannot be read.
+    """
+    cables = robot.cable_set(pulleys)
+    if not isinstance(resist, str | Path):
+        return path_task(robot, given, cables, resist)
+    wrenches = load_wrench_set(Path(resist))
+    try:
+        return path_task(robot, given, cables, wrenches)
+    except WrenchSetError as problem:
+        raise WrenchSetError(f"{resist}: {problem}") from problem
+
+
+def pose_in_degrees(X_WP: RigidTransform) -> list[float]:
+    """x, y, z [m], phi, theta, psi [deg]."""
+    angles = np.degrees(angles_from_rotation(X_WP.rotation()))
+    return [*X_WP.translation().tolist(), *angles.tolist()]
 
 
 def moved_dynamics(robot: Robot) -> PlatformDynamics:

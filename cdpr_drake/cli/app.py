@@ -115,9 +115,7 @@ class _Call:
         @app.meta.default
         def meta(
             *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-            json: Annotated[
-                bool, Parameter(negative=(), group=SHARED, show_default=False)
-            ] = False,
+            json: Annotated[bool, Parameter(negative=(), group=SHARED, show_default=False)] = False,
             plot: Annotated[
                 list[str] | None, Parameter(metavar="[FIGURE=]FILE", group=SHARED, n_tokens=1)
             ] = None,
@@ -219,8 +217,9 @@ def _usage_words(problem: CycloptsError, given: Sequence[str]) -> str:
         if choices or kind:
             words = f"{option}: found {token.value!r}; {accepted}"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
-        required = problem.argument.field_info.required
-        option = problem.argument.name.lstrip("-").upper() if required else problem.argument.name
+        option = problem.argument.name
+        if problem.argument.field_info.is_positional:
+            option = option.lstrip("-").upper()
         words = f"{option}: found nothing; accepted: a value"
     return f"{words}; see cdpr {name} --help".replace("  ", " ")
 

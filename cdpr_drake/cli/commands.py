@@ -39,6 +39,26 @@ COMMANDS = {
         ("cdpr tension acrobot_large",
          "cdpr tension acrobot_large --pose 0.35,-0.27,0.45 --method all"),
     ),
+    "plan": Command(
+        "Plan and design", f"{_VERBS}.planning.command:plan",
+        "Plans a motion within limits of tensions and winches: on a path, a free one, or a proven "
+        "one.",
+        ("cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
+         "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4"),
+    ),
+    "reconfigure": Command(
+        "Plan and design", f"{_VERBS}.design.reconfiguration:reconfigure",
+        "Places exit points along rails so that poses or a path are feasible or best, with a "
+        "proof.",
+        ("cdpr reconfigure acrobot_large --rails rails.yaml --poses 0.2,0,0.4",
+         "cdpr reconfigure caroca --rails rails.yaml --path poses.csv"),
+    ),
+    "design": Command(
+        "Plan and design", f"{_VERBS}.design.optimization:optimize_design",
+        "Searches for the best points, number of cables, drum and motor of a robot.",
+        ("cdpr design acrobot_large --goal capacity-margin",
+         "cdpr design acrobot_large --goal static --goal accuracy --quick"),
+    ),
     "notebooks": Command(
         "Tools", f"{_VERBS}.front.scenarios:load_scenario", "Lists notebooks, or copies them.",
         ("cdpr notebooks", "cdpr notebooks my_notebooks"),

@@ -10,6 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
 from cdpr_drake.summaries import MOST_LINES
 
@@ -22,6 +23,12 @@ HOMES = {
 
 def shows_itself(result):
     """In a few lines, as text and as HTML; what a verb returned also for JSON, and as a figure."""
+    if isinstance(result, Result):
+        assert as_json(result)
+        assert isinstance(result.plot(), Figure)
+        assert "<table>" in result._repr_html_()
+        assert " object at 0x" not in repr(result)
+        return repr(result)
     if type(result) in RESULTS:
         assert as_json(result)
         assert isinstance(result.plot(), Figure)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from cdpr_drake.analyses.planning.plan_figures import phase_figure
+from cdpr_drake.analyses.planning.path_plan import phase_figure
 from cdpr_drake.models.robot_loader import load_robot
 from tests.figure_faults import figure_faults
 
@@ -21,7 +21,7 @@ def test_what_the_end_can_be_reached_from_is_seen_where_it_is_the_largest_speed(
         active=lambda: {"torque": np.repeat(s[:, None] > 0.5, 8, axis=1)},
     )  # fmt: skip
     run = SimpleNamespace(
-        plan=plan, samples=samples, robot=load_robot("acrobot_large"), about="made up"
+        solution=plan, samples=samples, robot=load_robot("acrobot_large"), title="made up"
     )
     figure = phase_figure(run)
     assert figure_faults(figure) == []

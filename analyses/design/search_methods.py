@@ -1,13 +1,17 @@
-"""Maximin search for a design: the largest least value of many smooth functions in [0, 1]^d.
+"""Searches for a design in the box [0, 1]^d: by evolution, or by slopes; and Pareto fronts.
 
-`SlopeSearch` seeks it by the slopes of the functions. `SLOPES` has those of goals by the
-coordinates of a design, where a goal is the least of smooth functions.
+* `EvolutionSearch` is CMA-ES by the package cmaes, a generation at a time; it needs no gradients.
+* `SlopeSearch` seeks the largest least value of many smooth functions by their slopes; `SLOPES` has
+  those of goals by the coordinates of a design.
+* `pareto_front` finds designs of several values that no other one dominates.
 
-Source: see `SlopeSearch`.
+Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
+2001; Deb, Multi-objective optimization using evolutionary algorithms, 2001; see `SlopeSearch`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -17,8 +21,15 @@ from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.goals import GoalContext
 from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import DesignError
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
 from cdpr_drake.workspaces.wrench_capacity import margin_slopes
+
+STEP = 0.2
+"""Standard deviation of the first generation, of boxes of width 1."""
+
+REFUSED = 1e9
+"""Score, with the sign changed, of designs that cannot be judged."""
 
 FIRST_STEP, LARGEST_STEP = 0.1, 0.5
 """Half widths of the box about the best design so far in which slopes are believed: at first, and
@@ -29,6 +40,70 @@ SMALLEST_STEP = 1e-4
 
 GOOD = 0.1
 """Share of the promised gain from which on a step is one; from half on the box grows."""
+
+
+def default_population(size: int) -> int:
+    """Designs of a generation for so many coordinates, as Hansen has it."""
+    return 4 + math.floor(3 * math.log(max(size, 1)))
+
+
+class EvolutionSearch:
+    """Asks for designs, is told their scores, and seeks the largest."""
+
+    def __init__(self, size: int, population: int, seed: int) -> None:
+        """In so many coordinates, from the middle of the box.
+
+        Raises:
+            DesignError: The package cmaes is not installed, or there is nothing to search.
+        """
+        if size < 1:
+            raise DesignError("design: found nothing that may move; accepted: a reach above 0")
+        try:
+            from cmaes import CMA
+        except ImportError as problem:
+            raise DesignError(
+                "design: the package cmaes is not installed; pip install 'cdpr_drake[design]'"
+            ) from problem
+        # One coordinate is searched as two of which the other does nothing: CMA wants several.
+        self.size, self._padded = size, max(size, 2)
+        self._search = CMA(
+            mean=np.full(self._padded, 0.5),
+            sigma=STEP,
+            bounds=np.tile([0.0, 1.0], (self._padded, 1)),
+            seed=seed,
+            population_size=population,
+        )
+        self._asked: list[Array] = []
+
+    def ask(self) -> Array:
+        """The designs of the next generation, shape (population, size)."""
+        self._asked = [self._search.ask() for _ in range(self._search.population_size)]
+        return np.array(self._asked)[:, : self.size]
+
+    def tell(self, scores: Array) -> None:
+        """Takes the scores of the designs asked for last, larger is better; NaN: refused."""
+        losses = np.where(np.isfinite(scores), -np.asarray(scores, float), REFUSED)
+        self._search.tell(list(zip(self._asked, losses.tolist(), strict=True)))
+
+
+def pareto_front(values: Array) -> np.ndarray:
+    """Which rows no other row equals or exceeds in everything and exceeds in something.
+
+    Args:
+        values: One design a row, larger is better, shape (n, k); rows with NaN never count.
+
+    Returns:
+        Shape (n,), bool. Of equal rows the first counts.
+    """
+    values = np.asarray(values, float)
+    good = np.all(np.isfinite(values), axis=1)
+    front = good.copy()
+    for i in np.flatnonzero(good):
+        others = values[good]
+        better = np.all(others >= values[i], axis=1) & np.any(others > values[i], axis=1)
+        equal = np.all(values[:i] == values[i], axis=1) & good[:i]
+        front[i] = not np.any(better) and not np.any(equal)
+    return front
 
 
 class SlopeSearch:
