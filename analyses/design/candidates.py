@@ -113,13 +113,13 @@ class Candidates:
 
     Attributes:
         text: Its robot file.
-        kept: Sets of cables, by number, each of which is tried.
+        cable_sets: Sets of cables, by number, each of which is tried.
         points: Moves of its exit points, then of its anchor points, all cables, tied together.
         ranges: Least and largest value of winch fields by name.
     """
 
     text: str
-    kept: tuple[tuple[int, ...], ...]
+    cable_sets: tuple[tuple[int, ...], ...]
     points: MovedPoints
     ranges: dict[str, tuple[float, float]]
 
@@ -130,27 +130,27 @@ class Candidates:
 
     def robot_text(self, number: int, coordinates: Array, title: str = "") -> str:
         """The robot file of a design, of the set of cables with a number."""
-        found: dict[str, Any] = load_yaml(self.text)
+        content: dict[str, Any] = load_yaml(self.text)
         moved = self.points.displacements(coordinates[: self.points.size])
-        m = len(found["cables"])
-        for k, cable in enumerate(found["cables"]):
+        m = len(content["cables"])
+        for k, cable in enumerate(content["cables"]):
             for key, column in (("exit_point", k), ("anchor_point", m + k)):
                 cable[key] = (np.array(cable[key], float) + moved[:, column]).tolist()
-        found["cables"] = [found["cables"][k] for k in self.kept[number]]
-        if len(found["cables"]) < m and found.get("slack_readings"):
-            readings = found["slack_readings"]
-            found["slack_readings"] = [readings[k] for k in self.kept[number]]
-        winch = found["winch"]
+        content["cables"] = [content["cables"][k] for k in self.cable_sets[number]]
+        if len(content["cables"]) < m and content.get("slack_readings"):
+            readings = content["slack_readings"]
+            content["slack_readings"] = [readings[k] for k in self.cable_sets[number]]
+        winch = content["winch"]
         for (name, (low, high)), share in zip(
             self.ranges.items(), coordinates[self.points.size :], strict=True
         ):
             winch[name] = float(low * (high / low) ** share)
         if self.ranges:
             pull = winch["motor_torque"] * winch["gear_ratio"] / winch["drum_radius"]
-            found["tension_bounds"]["upper"] = float(pull)
+            content["tension_bounds"]["upper"] = float(pull)
         if title:
-            found["title"] = title
-        return str(yaml.safe_dump(found, sort_keys=False, allow_unicode=True))
+            content["title"] = title
+        return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 
     def robot(self, number: int, coordinates: Array) -> Robot:
         """The robot of a design.
@@ -199,24 +199,24 @@ def make_candidates(robot_name: str, settings: DesignSettings, source: str) -> C
     for k, mirror in enumerate(settings.mirrors):
         where, axes = f"mirrors[{k}].pairs", AXES[mirror.axis]
         for pair in mirror.pairs:
-            one, dash, other = pair.partition("-")
+            first, dash, second = pair.partition("-")
             if not dash:
                 raise DesignError(f"{source}: {where}: found {pair!r}; accepted: such as C1-C4")
-            a, b = number(one.strip(), where), number(other.strip(), where)
+            a, b = number(first.strip(), where), number(second.strip(), where)
             mirrors += [Mirror(axes, a, b), Mirror(axes, m + a, m + b)]
-    kept = _kept(settings.cables, names, source)
+    cable_sets = _cable_sets(settings.cables, names, source)
     ranges = _ranges(robot, settings, source)
-    found = Candidates(robot_text(robot_name), kept, MovedPoints(half, mirrors), ranges)
-    if found.size == 0 and len(kept) < 2:
+    candidates = Candidates(robot_text(robot_name), cable_sets, MovedPoints(half, mirrors), ranges)
+    if candidates.size == 0 and len(cable_sets) < 2:
         raise DesignError(
             f"{source}: found nothing that may change; accepted: a reach above 0, ranges of the "
             "winch, or several sets of cables"
         )
-    return found
+    return candidates
 
 
-def _kept(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int, ...], ...]:
-    found = []
+def _cable_sets(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int, ...], ...]:
+    result = []
     for k, words in enumerate(sets):
         chosen = [word.strip() for word in words.split(",")]
         for name in chosen:
@@ -229,8 +229,8 @@ def _kept(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int
                 f"{source}: cables[{k}]: found {words!r}; accepted: {LEAST_CABLES} to "
                 f"{MOST_CABLES} different cables"
             )
-        found.append(tuple(sorted(names.index(name) for name in chosen)))
-    return tuple(found) or (tuple(range(len(names))),)
+        result.append(tuple(sorted(names.index(name) for name in chosen)))
+    return tuple(result) or (tuple(range(len(names))),)
 
 
 def _ranges(robot: Robot, settings: DesignSettings, source: str) -> dict[str, tuple[float, float]]:

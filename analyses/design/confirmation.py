@@ -120,17 +120,17 @@ def confirm(
             continue
         if say is not None:
             say(f"proving {kind} of {robot.name}")
-        asked = WorkspaceRequest(
+        request = WorkspaceRequest(
             required=judging.required if kind in RESISTING else None,
             around=interference_bodies(robot),
         )
-        question = make_workspace_question(name, [kind], judging.grid, asked=asked)
-        found = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
+        question = make_workspace_question(name, [kind], judging.grid, asked=request)
+        proof = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
         size = robot.frame.upper - robot.frame.lower
         volume = float(np.prod(size[:2] if robot.is_planar() else size))
-        volumes.append(found.inside * volume)
-        opens.append(found.open * volume)
-        finished &= found.finished
+        volumes.append(proof.inside * volume)
+        opens.append(proof.open * volume)
+        finished &= proof.finished
     unit = "m^2" if load_robot(original).is_planar() else "m^3"
     words = f"boxes of the frame proven inside, {boxes} judged"
     return Confirmation(goal, words, unit, volumes[0], volumes[1], opens[0], opens[1], finished)

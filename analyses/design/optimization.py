@@ -121,8 +121,9 @@ class Design(Result):
     @property
     def file(self) -> Path | None:
         """The robot file of the best design; None: there is none."""
-        kept = self.folder is not None and self.search.complete and self.search.best is not None
-        return self.folder / ROBOT_FILE if kept and self.folder is not None else None
+        if self.folder is None or not self.search.complete or self.search.best is None:
+            return None
+        return self.folder / ROBOT_FILE
 
     @property
     def interrupted(self) -> bool:
@@ -156,7 +157,7 @@ class Design(Result):
             "original": _named(search.names, search.original),
             "best": None if best is None else {
                 "design": best,
-                "cables": [k + 1 for k in search.candidates.kept[search.sets[best]]],
+                "cables": [k + 1 for k in search.candidates.cable_sets[search.sets[best]]],
                 "score": float(search.scores[best]),
                 **_named(search.names, search.values[best]),
             },
@@ -191,10 +192,10 @@ class Design(Result):
         ])]  # fmt: skip
 
     def lines(self) -> list[str]:
-        """Where results are, and how to go on."""
+        """Where results are."""
         lines = [] if self.file is None else [f"robot file: {self.file}"]
         lines += [] if self.folder is None else [f"results: {self.folder}"]
-        return lines + ["stopped; the same command goes on"] * self.interrupted
+        return lines
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """How the score rose; what goals cost each other; which points moved."""
@@ -213,7 +214,7 @@ class Design(Result):
         coordinates = [f"x{k + 1}" for k in range(search.candidates.size)]
         rows.writerow(["design", "cables", *coordinates, *search.names, "score", "on_front"])
         for k, x in enumerate(search.coordinates):
-            cables = " ".join(str(c + 1) for c in search.candidates.kept[search.sets[k]])
+            cables = " ".join(str(c + 1) for c in search.candidates.cable_sets[search.sets[k]])
             values = _named(search.names, search.values[k]).values()
             rows.writerow([k, cables, *x.tolist(), *values, search.scores[k], k in front])
         with folder.file(TABLE) as part:
@@ -280,9 +281,9 @@ def optimize_design(
         results = stack.enter_context(Folder(Path(where), arguments, overwrite, grows=True))
         try:
             # A robot that was given as one is searched as such.
-            given = robot if isinstance(robot, Robot) else name
+            subject = robot if isinstance(robot, Robot) else name
             solution = search_design(
-                given, candidates, settings, results, workers=workers, follow=follow
+                subject, candidates, settings, results, workers=workers, follow=follow
             )
         except DesignError as problem:
             if goals or parameters is None:
@@ -305,6 +306,7 @@ def optimize_design(
             written(design, results, formats, follow)
         elif folder is not None:
             design.write(results)
+            follow.say("stopped; the same command goes on")
     return design
 
 
@@ -405,12 +407,12 @@ def _points(design: Design) -> Figure:
 def _draw_progress(axes: Any, search: DesignSearch) -> None:
     from cdpr_drake.analyses.visualization.figure_style import line_style
 
-    for number in range(len(search.candidates.kept)):
+    for number in range(len(search.candidates.cable_sets)):
         chosen = search.scores[search.sets == number]
         if not len(chosen):
             continue
         look = nth_look(number)
-        words = f"{len(search.candidates.kept[number])} cables"
+        words = f"{len(search.candidates.cable_sets[number])} cables"
         index = np.arange(1, len(chosen) + 1)
         axes.plot(index, chosen, ".", color=look.color, markersize=3, alpha=0.5)
         best = np.fmax.accumulate(chosen)
@@ -458,7 +460,7 @@ def _draw_points(axes: Any, search: DesignSearch) -> None:
     candidates = search.candidates
     before = parse_robot(candidates.text, Path("robot"))
     after = candidates.robot(search.sets[search.best], search.coordinates[search.best])
-    cables = list(candidates.kept[search.sets[search.best]])
+    cables = list(candidates.cable_sets[search.sets[search.best]])
     old_set, new_set = before.cable_set(), after.cable_set()
     for panel, title, frame, old, new in (
         (axes[0], "exit points, from above", "W", old_set.p_WA, new_set.p_WA),

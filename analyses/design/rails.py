@@ -55,7 +55,7 @@ def put_rails(robot: Robot, rails: Sequence[RailSettings], source: str = "rails"
     Raises:
         PlanningError: A cable is unknown, on two rails, or a rail has no direction or length.
     """
-    found, names = deepcopy(robot), [cable.name for cable in robot.cables]
+    result, names = deepcopy(robot), [cable.name for cable in robot.cables]
     taken: set[str] = set()
     for k, rail in enumerate(rails):
         where = f"{source}: rails[{k}]"
@@ -72,10 +72,10 @@ def put_rails(robot: Robot, rails: Sequence[RailSettings], source: str = "rails"
             if name in taken:
                 raise PlanningError(f"{where}.cables: found {name} again; accepted: once")
             taken.add(name)
-            cable = found.cables[names.index(name)]
+            cable = result.cables[names.index(name)]
             cable.exit_point = robot.cable_set().p_WA[:, names.index(name)]
             cable.rail = Rail(axis=np.array(rail.axis), lower=rail.lower, upper=rail.upper)
-    return found
+    return result
 
 
 def rails_of(robot: Robot, groups: Sequence[Sequence[str]] = ()) -> tuple[Rails, list[str]]:

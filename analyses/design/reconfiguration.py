@@ -465,9 +465,9 @@ def _impossible(task: RailTask, margins: Array) -> str:
     k, c = divmod(int(np.argmin(margins)), margins.shape[1])
     corners = np.zeros((1, 6))
     if task.required is not None:
-        found = task.required.corners(task.case.rows)
-        corners = np.zeros((len(found), 6))
-        corners[:, list(task.case.rows)] = found
+        rows = task.required.corners(task.case.rows)
+        corners = np.zeros((len(rows), 6))
+        corners[:, list(task.case.rows)] = rows
     place = ", ".join(f"{x:.4g}" for x in task.poses[k].translation())
     return (
         f"rails: found none of their positions for pose {k + 1} of {len(task.poses)}, ({place}) m, "
@@ -478,14 +478,14 @@ def _impossible(task: RailTask, margins: Array) -> str:
 
 
 def _moved(robot: Robot, names: list[str], coordinates: Array) -> Robot:
-    found = deepcopy(robot)
-    by_name = {cable.name: cable for cable in found.cables}
+    result = deepcopy(robot)
+    by_name = {cable.name: cable for cable in result.cables}
     for group, value in zip(names, coordinates, strict=True):
         for name in group.split(","):
             rail = by_name[name].rail
             assert rail is not None
             rail.at = float(min(max(value, rail.lower), rail.upper))
-    return found
+    return result
 
 
 def _over_pulleys(task: RailTask, robot: Robot, limits: tuple[float, float] | None) -> Array:

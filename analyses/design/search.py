@@ -176,7 +176,7 @@ def search_design(
     original = evaluate_original(candidates, judging, names)
     search = _Search(candidates, settings, judging, names, original, folder, workers, follow)
     with search.standing:
-        for number in range(len(candidates.kept)):
+        for number in range(len(candidates.cable_sets)):
             if candidates.size and slopes is not None:
                 complete = search.by_slopes(number, slopes)
             else:
@@ -236,7 +236,7 @@ class _Search:
         self._candidates, self._settings, self._judging = candidates, settings, judging
         self._original, self._folder, self._workers = original, folder, workers
         self._work = partial(judged, candidates, names, judging)
-        self._follow, self._best = follow, -np.inf
+        self._follow, self._best, self._said = follow, -np.inf, set[str]()
         self._known = {} if folder is None or not folder.resumed else _read(folder.path / JUDGED)
         if folder is not None and self._known:  # without a line that a kill has cut
             lines = (json.dumps(item) + "\n" for item in self._known.items())
@@ -245,7 +245,7 @@ class _Search:
         self._population = settings.population or default_population(candidates.size)
         each = self._population if candidates.size and not slopes else 1
         rounds = settings.generations if candidates.size else 1
-        total = len(candidates.kept) * rounds * each
+        total = len(candidates.cable_sets) * rounds * each
         self.count = Count(follow, total, min(len(self._known), total), unit="designs")
 
     def by_evolution(self, number: int) -> bool:
@@ -296,7 +296,7 @@ class _Search:
         self.earlier += len(X) - len(lacking)
         for finished in finished_jobs(
             self._work, [(number, X[k]) for k in lacking], self._workers, stop=self._follow.stop,
-            say=self._follow.say, name="design", standing=self.standing,
+            say=self._say, name="design", standing=self.standing,
         ):  # fmt: skip
             if finished.problem is not None:
                 raise finished.problem
@@ -313,6 +313,12 @@ class _Search:
         finite = np.all(np.isfinite(goals), axis=1)
         self._best = max([self._best, *self._scores(goals)[finite]])
         return goals
+
+    def _say(self, words: str) -> None:
+        """Says words of a cluster once, not in each generation."""
+        if words not in self._said:
+            self._said.add(words)
+            self._follow.say(words)
 
     def _keep(self, key: str, values: list[float]) -> None:
         self._known[key] = values

@@ -149,10 +149,10 @@ class SlopeSearch:
         """
         gain = value - self.value
         if np.isfinite(self.value):
-            kept = gain / self._promised if np.isfinite(gain) else -np.inf
-            if kept < GOOD:
+            share = gain / self._promised if np.isfinite(gain) else -np.inf
+            if share < GOOD:
                 self._step *= 0.4
-            elif kept > 0.5:
+            elif share > 0.5:
                 self._step = min(1.5 * self._step, LARGEST_STEP)
         elif not np.isfinite(value):
             self._step = 0.0  # the first design is refused, and there are no slopes
@@ -167,16 +167,16 @@ class SlopeSearch:
         low = np.maximum(-self._step, -self.best)
         high = np.minimum(self._step, 1.0 - self.best)
         # Largest t with values + slopes s >= t.
-        found = linprog(
+        program = linprog(
             np.append(np.zeros(d), -1.0),
             A_ub=np.hstack([-self._slopes, np.ones((n, 1))]), b_ub=self._values,
             bounds=[*zip(low, high, strict=True), (None, None)], method="highs",
         )  # fmt: skip
-        self._promised = -np.inf if found.x is None else float(found.x[-1] - self.value)
+        self._promised = -np.inf if program.x is None else float(program.x[-1] - self.value)
         if self._promised <= 1e-9 * max(abs(self.value), 1e-9):
             self._step = 0.0
             return
-        self._asked = np.clip(self.best + found.x[:-1], 0.0, 1.0)
+        self._asked = np.clip(self.best + program.x[:-1], 0.0, 1.0)
 
 
 Slopes = Callable[[Candidates, int, Array, GoalContext], tuple[Array, Array]]
@@ -191,19 +191,19 @@ def _capacity_margin(
     positions, rotations = grid.positions(0, grid.size), grid.rotations(0, grid.size)
     demand = resisting(about.case, about.required or SpatialSet(), rotations)
     slopes = margin_slopes(about.case, positions, rotations, demand)
-    kept = list(candidates.kept[number])
+    cables = list(candidates.cable_sets[number])
     m = candidates.points.reach.shape[1] // 2
     by_points = np.zeros((grid.size, 3, 2 * m))
-    by_points[:, :, kept] = slopes.exits
-    by_points[:, :, [m + k for k in kept]] = slopes.anchors
-    found = candidates.points.slopes(by_points)
+    by_points[:, :, cables] = slopes.exits
+    by_points[:, :, [m + k for k in cables]] = slopes.anchors
+    by_coordinates = candidates.points.slopes(by_points)
     # Of the winch, each on a scale of its own logarithm: the largest tension is what it pulls.
     pull, signs = robot.tension_limits(None)[1], {"drum_radius": -1.0}
     winch = [
         slopes.upper * pull * signs.get(name, 1.0) * np.log(high / low)
         for name, (low, high) in candidates.ranges.items()
     ]
-    return slopes.found.margins, np.column_stack([found, *winch])
+    return slopes.found.margins, np.column_stack([by_coordinates, *winch])
 
 
 SLOPES: dict[str, Slopes] = {"capacity-margin": _capacity_margin}

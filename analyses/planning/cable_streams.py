@@ -302,14 +302,15 @@ def _checked(
     plan: Planned, cables: CableSet, model: str, times: Array, lengths: Array
 ) -> StreamCheck:
     share = np.arange(BETWEEN + 1) / (BETWEEN + 1)
-    asked = (times[:-1, None] + share * np.diff(times)[:, None]).ravel()
-    asked = np.append(asked, times[-1])
-    between = np.column_stack([np.interp(asked, times, column) for column in lengths.T])
+    instants = (times[:-1, None] + share * np.diff(times)[:, None]).ravel()
+    instants = np.append(instants, times[-1])
+    between = np.column_stack([np.interp(instants, times, column) for column in lengths.T])
     states = [
-        cable_state(cables, model, _pose(plan, t), l0) for t, l0 in zip(asked, between, strict=True)
+        cable_state(cables, model, _pose(plan, t), l0)
+        for t, l0 in zip(instants, between, strict=True)
     ]
     tensions = np.array([state.tensions for state in states])
     return StreamCheck(
-        tensions.min(axis=0), asked[np.argmin(tensions, axis=0)], tensions.max(axis=0),
-        np.sum([state.slack for state in states], axis=0), len(asked),
+        tensions.min(axis=0), instants[np.argmin(tensions, axis=0)], tensions.max(axis=0),
+        np.sum([state.slack for state in states], axis=0), len(instants),
     )  # fmt: skip

@@ -171,7 +171,7 @@ def camera_view(robot: Robot, name: str | None) -> View:
         raise PlanningError(
             f"camera: found {name!r}; accepted for {robot.name}: {', '.join(names) or 'none'}"
         )
-    mount = mounts[0] if name is None else next(one for one in mounts if one.name == name)
+    mount = mounts[0] if name is None else next(mount for mount in mounts if mount.name == name)
     return View(mount.pose.transform(), load_camera(mount.model).view_slopes())
 
 
@@ -356,7 +356,7 @@ def _time_along(task: PathTask, path: PosePath) -> float:
 def is_free(constraints: Sequence[PoseConstraint], path: PosePath) -> bool:
     """Whether a path keeps constraints of `BodyState` at every pose that is looked at."""
     rows = path.points(np.linspace(0.0, path.length, LOOKS))[:, :7]
-    return all(not np.any(one.missed(one.evaluate(rows)[0]) > 0.0) for one in constraints)
+    return all(not np.any(each.missed(each.evaluate(rows)[0]) > 0.0) for each in constraints)
 
 
 def detours(
@@ -382,7 +382,7 @@ def detours(
     length = float(np.linalg.norm(way))
     best: list[PosePath] = []
     for across in _across(way, moves):
-        found: list[PosePath] = []
+        ways: list[PosePath] = []
         for share in SHARES:
             for step in range(1, STEPS + 1):
                 off = across * (length * step / STEPS)
@@ -392,10 +392,10 @@ def detours(
                 corners += [first] if share == 0.5 else [first, last]
                 path = straight_path([*corners, goal], length_scale)
                 if is_free(constraints, path):
-                    found.append(path)
+                    ways.append(path)
                     break
-        if found:
-            best.append(min(found, key=lambda path: path.length))
+        if ways:
+            best.append(min(ways, key=lambda path: path.length))
     return sorted(best, key=lambda path: path.length)[:MOST_DETOURS]
 
 

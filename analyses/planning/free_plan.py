@@ -265,7 +265,7 @@ def plan_free_motion(
         name = "nearest" if camera is None else "camera"
         raise PlanningError(f"{name}: found without in_view; accepted: with in_view")
     loaded = as_robot(robot, "plan_free_motion")
-    given = LimitSettings(
+    limit_settings = LimitSettings(
         tensions=limits, cable_speed=cable_speed, cable_acceleration=cable_acceleration,
         speed=speed, reserve=reserve,
     )  # fmt: skip
@@ -277,8 +277,8 @@ def plan_free_motion(
         in_view=value_of(in_view), camera=camera, nearest=NEAREST if nearest is None else nearest,
         guess=read_motion(Path(guess)) if _is_file(guess) else guess,
     )  # fmt: skip
-    task = robot_task(loaded, given, pulleys)
-    arguments = given.as_dict(pulleys) | {
+    task = robot_task(loaded, limit_settings, pulleys)
+    arguments = limit_settings.as_dict(pulleys) | {
         "from": start if isinstance(start, Word) else pose_in_degrees(X_start),
         "to": goal if isinstance(goal, Word) else pose_in_degrees(X_goal),
         "least": least, "duration": duration, "clearance": clearance, "camera": camera,
@@ -300,7 +300,7 @@ def plan_free_motion(
             planning_time=time.perf_counter() - begin, settings=settings,
         )  # fmt: skip
         return finished(
-            plan, given, results, track=track, stream=stream, stream_model=stream_model,
+            plan, limit_settings, results, track=track, stream=stream, stream_model=stream_model,
             formats=formats, follow=follow,
         )  # fmt: skip
 

@@ -226,11 +226,11 @@ def plan_path(
     loaded = as_robot(robot, "plan_path")
     if track:
         loaded.servo_rows(TRACKING)  # a refusal comes before the work
-    given = LimitSettings(
+    limit_settings = LimitSettings(
         tensions=limits, cable_speed=cable_speed, cable_acceleration=cable_acceleration,
         speed=speed, reserve=reserve,
     )  # fmt: skip
-    task = robot_task(loaded, given, pulleys, resist)
+    task = robot_task(loaded, limit_settings, pulleys, resist)
     route = path_poses(loaded, value_of(path))
     for remark in route.remarks:
         follow.say(f"note: {path}: {remark}")
@@ -238,7 +238,7 @@ def plan_path(
     way = make_path(loaded, route.poses, corners, tolerance, moves)
     is_file = isinstance(path, Path | str) and not isinstance(path, Word)
     rows = path if isinstance(path, Word) else [pose_in_degrees(X) for X in route.poses]
-    arguments = given.as_dict(pulleys) | {
+    arguments = limit_settings.as_dict(pulleys) | {
         "path": str(path) if is_file else None, "waypoints": None if is_file else rows,
         "corners": corners, "tolerance_m": tolerance, "stations": stations,
     }  # fmt: skip
@@ -261,7 +261,7 @@ def plan_path(
             planning_time=time.perf_counter() - begin, source=route.source,
         )  # fmt: skip
         return finished(
-            plan, given, results, track=track, stream=stream, stream_model=stream_model,
+            plan, limit_settings, results, track=track, stream=stream, stream_model=stream_model,
             formats=formats, follow=follow,
         )  # fmt: skip
 

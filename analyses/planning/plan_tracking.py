@@ -83,19 +83,19 @@ class TrackedPlan(Result):
         """Largest share of each limit that was used, by its name; above 1: it was missed."""
         t, lim = self.log["tensions"][1:], self.limits
         middle, half = 0.5 * (lim.upper + lim.lower), 0.5 * (lim.upper - lim.lower)
-        found = {
+        shares = {
             "tension": float(np.max(np.abs(t - middle)) / half),
             "cable speed": float(np.max(np.abs(self.cable_speeds)) / lim.cable_speed),
         }
         if np.isfinite(lim.cable_acceleration):
             most = float(np.max(np.abs(self.cable_accelerations)))
-            found["cable acceleration"] = most / lim.cable_acceleration
+            shares["cable acceleration"] = most / lim.cable_acceleration
         if np.isfinite(lim.torque):
-            found["torque"] = float(np.max(np.abs(self.torques)) / lim.torque)
+            shares["torque"] = float(np.max(np.abs(self.torques)) / lim.torque)
         if np.isfinite(lim.speed):
             steps = np.linalg.norm(np.diff(self.log["X_WP"][:, 4:], axis=0), axis=1)
-            found["speed of Po"] = float(np.max(steps)) * RATE / lim.speed
-        return found
+            shares["speed of Po"] = float(np.max(steps)) * RATE / lim.speed
+        return shares
 
     def keeps_limits(self) -> bool:
         """Whether no limit was missed, and tensions were found at every step."""

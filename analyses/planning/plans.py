@@ -218,7 +218,7 @@ Planned = TypeVar("Planned", bound=Plan)
 
 
 def finished(
-    plan: Planned, given: LimitSettings, results: Folder | None, *, track: bool | None,
+    plan: Planned, limit_settings: LimitSettings, results: Folder | None, *, track: bool | None,
     stream: float | None, stream_model: str | None, formats: Sequence[str], follow: Follow,
 ) -> Planned:  # fmt: skip
     """A plan that is tracked and streamed, if that is asked for, and written into a folder.
@@ -229,7 +229,7 @@ def finished(
         StoppedError: The work was asked to stop.
     """
     folder = None if results is None else results.path
-    plan = replace(plan, limits=robot_limits(plan.robot, given), folder=folder)
+    plan = replace(plan, limits=robot_limits(plan.robot, limit_settings), folder=folder)
     is_point = plan.robot.motion_type().is_point
     if track is None and results is not None and is_point:
         follow.say("note: not tracked: computed torque moves bodies alone")

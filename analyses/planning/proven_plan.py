@@ -274,11 +274,11 @@ def plan_proven_motion(
     if boxes is not None and boxes < 1:
         raise PlanningError(f"boxes: found {boxes}; accepted: at least 1")
     loaded = as_robot(robot, "plan_proven_motion")
-    given = LimitSettings(
+    limit_settings = LimitSettings(
         tensions=limits, cable_speed=cable_speed, cable_acceleration=cable_acceleration,
         speed=speed, reserve=reserve,
     )  # fmt: skip
-    task = robot_task(loaded, given, pulleys)
+    task = robot_task(loaded, limit_settings, pulleys)
     X_ends = [as_pose(loaded, value_of(pose)) for pose in (start, goal)]
     ends = [np.concatenate([X.translation(), angles_from_rotation(X.rotation())]) for X in X_ends]
     box, cost = value_of(accelerations), "time" if least_time else "length"
@@ -289,7 +289,7 @@ def plan_proven_motion(
         moving = (*more, *moving)
     if moving:
         _check_among_moving(method, box, ends)
-    arguments = given.as_dict(pulleys) | {
+    arguments = limit_settings.as_dict(pulleys) | {
         "from": start if isinstance(start, Word) else pose_in_degrees(X_ends[0]),
         "to": goal if isinstance(goal, Word) else pose_in_degrees(X_ends[1]),
         "least": cost, "time": least_time, "clearance": clearance, "boxes": boxes,
@@ -343,7 +343,7 @@ def plan_proven_motion(
                 sets_time=between - begin, judged=judged(sets, in_sets.plan, JUDGED),
             )  # fmt: skip
         return finished(
-            plan, given, results, track=track, stream=stream, stream_model=stream_model,
+            plan, limit_settings, results, track=track, stream=stream, stream_model=stream_model,
             formats=formats, follow=follow,
         )  # fmt: skip
 

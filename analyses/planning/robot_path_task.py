@@ -81,7 +81,7 @@ class LimitSettings:
         }
 
 
-def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
+def robot_limits(robot: Robot, settings: LimitSettings) -> MotionLimits:
     """The limits of a robot, without reserve.
 
     Of the rated torque friction takes its largest part first: the static one, and the viscous one
@@ -90,7 +90,7 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     Raises:
         PlanningError: A limit is not accepted.
     """
-    lower, upper = robot.tension_limits(given.tensions)
+    lower, upper = robot.tension_limits(settings.tensions)
     winch = robot.winch
     radii = robot.drum().radii(len(robot.cables))
     if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
@@ -99,7 +99,12 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
             "on their drums; accepted for a plan: a winch for each cable, all alike"
         )
     ratio = float(radii[0])
-    cable_speed = winch.rated_cable_speed() if given.cable_speed is None else given.cable_speed
+    cable_speed = settings.cable_speed
+    if cable_speed is None:
+        cable_speed = winch.rated_cable_speed()
+    acceleration, speed = (
+        np.inf if most is None else most for most in (settings.cable_acceleration, settings.speed)
+    )
     torque = np.inf
     if winch.motor_torque is not None:
         torque = winch.motor_torque
@@ -112,23 +117,21 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
             )
     return MotionLimits(
         lower=lower, upper=upper, cable_speed=cable_speed, torque=torque,
-        cable_acceleration=np.inf if given.cable_acceleration is None else given.cable_acceleration,
-        inertia=winch.inertia or 0.0, ratio=ratio,
-        speed=np.inf if given.speed is None else given.speed,
+        cable_acceleration=acceleration, inertia=winch.inertia or 0.0, ratio=ratio, speed=speed,
     )  # fmt: skip
 
 
 def path_task(
     robot: Robot,
-    given: LimitSettings,
+    settings: LimitSettings,
     cables: CableSet | None = None,
     resist: SpatialSet | None = None,
 ) -> PathTask:
-    """A robot for planning, with its limits less the reserve if one is given.
+    """A robot for planning, with its limits less the reserve if one is settings.
 
     Args:
         robot: The robot.
-        given: Limits beside its own.
+        settings: Limits beside its own.
         cables: Its cables; None: over its pulleys.
         resist: Wrenches on the platform that every point of a path must resist; None: none.
 
@@ -140,20 +143,21 @@ def path_task(
     dynamics = moved_dynamics(robot)
     lifts = UPWARDS in dynamics.motions
     weight = robot.platform.mass * robot.gravity if lifts else 0.0
-    limits = robot_limits(robot, given).within(given.reserve or 0.0, weight)
+    limits = robot_limits(robot, settings).within(settings.reserve or 0.0, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
     if resist is None:
         return PathTask(cables, dynamics, limits, names)
-    found = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
-    corners = np.zeros((len(found), 6))
-    corners[:, list(dynamics.motions)] = found
+    rows = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
+    corners = np.zeros((len(rows), 6))
+    corners[:, list(dynamics.motions)] = rows
     return PathTask(cables, dynamics, limits, names, corners)
 
 
 def robot_task(
-    robot: Robot, given: LimitSettings, pulleys: bool, resist: SpatialSet | Path | str | None = None
-) -> PathTask:
+    robot: Robot, settings: LimitSettings, pulleys: bool,
+    resist: SpatialSet | Path | str | None = None,
+) -> PathTask:  # fmt: skip
     """The robot as it is planned with; `resist` is a set of wrenches, or its file.
 
     Raises:
@@ -161,10 +165,10 @@ def robot_task(
     """
     cables = robot.cable_set(pulleys)
     if not isinstance(resist, str | Path):
-        return path_task(robot, given, cables, resist)
+        return path_task(robot, settings, cables, resist)
     wrenches = load_wrench_set(Path(resist))
     try:
-        return path_task(robot, given, cables, wrenches)
+        return path_task(robot, settings, cables, wrenches)
     except WrenchSetError as problem:
         raise WrenchSetError(f"{resist}: {problem}") from problem
 
