@@ -1,3 +1,5 @@
+from .analyses.design.optimization import optimize_design as optimize_design
+from .analyses.design.reconfiguration import reconfigure as reconfigure
 from .analyses.environments import environment_names as environment_names
 from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
@@ -6,15 +8,10 @@ from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
-from .analyses.front.design import optimize_design as optimize_design
 from .analyses.front.failures import compare_reactions as compare_reactions
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
-from .analyses.front.planning import plan_free_motion as plan_free_motion
-from .analyses.front.planning import plan_path as plan_path
-from .analyses.front.proven_motions import plan_proven_motion as plan_proven_motion
-from .analyses.front.reconfiguration import reconfigure as reconfigure
 from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
@@ -28,6 +25,9 @@ from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics
 from .analyses.logs.log_request import LogRequest as LogRequest
+from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
+from .analyses.planning.path_plan import plan_path as plan_path
+from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
 from .analyses.statics.static import solve_static as solve_static
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case

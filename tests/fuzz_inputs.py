@@ -94,9 +94,9 @@ PICTURES = (
 
 
 LONG_WORK = {
-    "design": ["cdpr_drake.cli.command_session.CommandSession.computing"],
-    "plan": ["cdpr_drake.cli.plan.plan_path"],
-    "reconfigure": ["cdpr_drake.analyses.front.reconfiguration.reconfigured"],
+    "design": ["cdpr_drake.analyses.design.optimization.search_design"],
+    "plan": ["cdpr_drake.analyses.planning.path_plan.plan_along_path"],
+    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.reconfigured"],
 }
 """Where the long work of a command begins: all that it reads is read and accepted there."""
 

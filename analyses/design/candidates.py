@@ -1,4 +1,5 @@
-"""Robot files of designs: points moved, cables left out, drum and motor changed."""
+"""Robot files of designs: points moved, some as images of others, cables left out, drum and motor
+changed."""
 
 from __future__ import annotations
 
@@ -10,8 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cdpr_drake.analyses.design.moved_points import AXES, Mirror, MovedPoints
-from cdpr_drake.analyses.design.settings import DesignSettings, MovedSettings
+from cdpr_drake.analyses.design.settings import AXES, DesignSettings, MovedSettings
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_text
@@ -24,19 +24,102 @@ LEAST_CABLES, MOST_CABLES = 4, 8
 WINCH = ("drum_radius", "gear_ratio", "motor_torque")
 
 
+@dataclass(frozen=True)
+class Mirror:
+    """Point `second` moves as the image of point `first` does, in a plane or by half a turn.
+
+    Attributes:
+        axes: Along which displacements change their sign: one, the normal of a plane, or two, half
+            a turn about the third.
+        first: Number of a point.
+        second: Number of another; or of the same, which then does not move along these axes.
+    """
+
+    axes: tuple[int, ...]
+    first: int
+    second: int
+
+
+class MovedPoints:
+    """Displacements of points as functions of few coordinates in [0, 1].
+
+    Every coordinate of every point is free, or tied to that of another with the same sign or the
+    opposite one. Where ties contradict each other, the coordinate does not move. Half a box is the
+    least among those that are tied.
+    """
+
+    def __init__(self, reach: Array, mirrors: Sequence[Mirror] = ()) -> None:
+        """For points that move by at most `reach`, shape (3, m), >= 0 [m], either way."""
+        self.reach = np.asarray(reach, float)
+        m = self.reach.shape[1]
+        parent, sign, still = list(range(3 * m)), [1.0] * (3 * m), set[int]()
+
+        def root(k: int) -> tuple[int, float]:
+            total = 1.0
+            while parent[k] != k:
+                total *= sign[k]
+                k = parent[k]
+            return k, total
+
+        for mirror in mirrors:
+            for axis in range(3):
+                opposite = -1.0 if axis in mirror.axes else 1.0
+                a, s = root(3 * mirror.first + axis)
+                b, t = root(3 * mirror.second + axis)
+                if a != b:
+                    parent[b], sign[b] = a, s * opposite * t
+                elif s * opposite != t:
+                    still.add(a)
+        still = {root(k)[0] for k in still}
+        groups: dict[int, list[tuple[int, float]]] = {}
+        for k in range(3 * m):
+            first, s = root(k)
+            groups.setdefault(first, []).append((k, s))
+        self._columns: list[Array] = []
+        for first, members in groups.items():
+            half = min(self.reach[k % 3, k // 3] for k, _ in members)
+            if first in still or half <= 0.0:
+                continue
+            column = np.zeros(3 * m)
+            for k, s in members:
+                column[k] = s * half
+            self._columns.append(column.reshape(m, 3).T)
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return len(self._columns)
+
+    def displacements(self, coordinates: Array) -> Array:
+        """Displacements, shape (3, m) [m]; those of coordinates of 0.5 are zero."""
+        moved = np.zeros_like(self.reach)
+        for value, column in zip(coordinates, self._columns, strict=True):
+            moved += (2.0 * value - 1.0) * column
+        return moved
+
+    def slopes(self, by_points: Array) -> Array:
+        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points.
+
+        Args:
+            by_points: Shape (n, 3, m) [1/m].
+        """
+        columns = np.array(self._columns).reshape(-1, *self.reach.shape)
+        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, columns))
+
+
 @dataclass(frozen=True, eq=False)
 class Candidates:
     """The designs that a robot may become; pickles.
 
     Attributes:
         text: Its robot file.
-        kept: Sets of cables, by number, each of which is tried.
+        cable_sets: Sets of cables, by number, each of which is tried.
         points: Moves of its exit points, then of its anchor points, all cables, tied together.
         ranges: Least and largest value of winch fields by name.
     """
 
     text: str
-    kept: tuple[tuple[int, ...], ...]
+    cable_sets: tuple[tuple[int, ...], ...]
     points: MovedPoints
     ranges: dict[str, tuple[float, float]]
 
@@ -47,27 +130,27 @@ class Candidates:
 
     def robot_text(self, number: int, coordinates: Array, title: str = "") -> str:
         """The robot file of a design, of the set of cables with a number."""
-        found: dict[str, Any] = load_yaml(self.text)
+        content: dict[str, Any] = load_yaml(self.text)
         moved = self.points.displacements(coordinates[: self.points.size])
-        m = len(found["cables"])
-        for k, cable in enumerate(found["cables"]):
+        m = len(content["cables"])
+        for k, cable in enumerate(content["cables"]):
             for key, column in (("exit_point", k), ("anchor_point", m + k)):
                 cable[key] = (np.array(cable[key], float) + moved[:, column]).tolist()
-        found["cables"] = [found["cables"][k] for k in self.kept[number]]
-        if len(found["cables"]) < m and found.get("slack_readings"):
-            readings = found["slack_readings"]
-            found["slack_readings"] = [readings[k] for k in self.kept[number]]
-        winch = found["winch"]
+        content["cables"] = [content["cables"][k] for k in self.cable_sets[number]]
+        if len(content["cables"]) < m and content.get("slack_readings"):
+            readings = content["slack_readings"]
+            content["slack_readings"] = [readings[k] for k in self.cable_sets[number]]
+        winch = content["winch"]
         for (name, (low, high)), share in zip(
             self.ranges.items(), coordinates[self.points.size :], strict=True
         ):
             winch[name] = float(low * (high / low) ** share)
         if self.ranges:
             pull = winch["motor_torque"] * winch["gear_ratio"] / winch["drum_radius"]
-            found["tension_bounds"]["upper"] = float(pull)
+            content["tension_bounds"]["upper"] = float(pull)
         if title:
-            found["title"] = title
-        return str(yaml.safe_dump(found, sort_keys=False, allow_unicode=True))
+            content["title"] = title
+        return str(yaml.safe_dump(content, sort_keys=False, allow_unicode=True))
 
     def robot(self, number: int, coordinates: Array) -> Robot:
         """The robot of a design.
@@ -116,24 +199,24 @@ def make_candidates(robot_name: str, settings: DesignSettings, source: str) -> C
     for k, mirror in enumerate(settings.mirrors):
         where, axes = f"mirrors[{k}].pairs", AXES[mirror.axis]
         for pair in mirror.pairs:
-            one, dash, other = pair.partition("-")
+            first, dash, second = pair.partition("-")
             if not dash:
                 raise DesignError(f"{source}: {where}: found {pair!r}; accepted: such as C1-C4")
-            a, b = number(one.strip(), where), number(other.strip(), where)
+            a, b = number(first.strip(), where), number(second.strip(), where)
             mirrors += [Mirror(axes, a, b), Mirror(axes, m + a, m + b)]
-    kept = _kept(settings.cables, names, source)
+    cable_sets = _cable_sets(settings.cables, names, source)
     ranges = _ranges(robot, settings, source)
-    found = Candidates(robot_text(robot_name), kept, MovedPoints(half, mirrors), ranges)
-    if found.size == 0 and len(kept) < 2:
+    candidates = Candidates(robot_text(robot_name), cable_sets, MovedPoints(half, mirrors), ranges)
+    if candidates.size == 0 and len(cable_sets) < 2:
         raise DesignError(
             f"{source}: found nothing that may change; accepted: a reach above 0, ranges of the "
             "winch, or several sets of cables"
         )
-    return found
+    return candidates
 
 
-def _kept(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int, ...], ...]:
-    found = []
+def _cable_sets(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int, ...], ...]:
+    result = []
     for k, words in enumerate(sets):
         chosen = [word.strip() for word in words.split(",")]
         for name in chosen:
@@ -146,8 +229,8 @@ def _kept(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int
                 f"{source}: cables[{k}]: found {words!r}; accepted: {LEAST_CABLES} to "
                 f"{MOST_CABLES} different cables"
             )
-        found.append(tuple(sorted(names.index(name) for name in chosen)))
-    return tuple(found) or (tuple(range(len(names))),)
+        result.append(tuple(sorted(names.index(name) for name in chosen)))
+    return tuple(result) or (tuple(range(len(names))),)
 
 
 def _ranges(robot: Robot, settings: DesignSettings, source: str) -> dict[str, tuple[float, float]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -121,17 +120,17 @@ def confirm(
             continue
         if say is not None:
             say(f"proving {kind} of {robot.name}")
-        asked = WorkspaceRequest(
+        request = WorkspaceRequest(
             required=judging.required if kind in RESISTING else None,
             around=interference_bodies(robot),
         )
-        question = make_workspace_question(name, [kind], judging.grid, asked=asked)
-        found = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
+        question = make_workspace_question(name, [kind], judging.grid, asked=request)
+        proof = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
         size = robot.frame.upper - robot.frame.lower
         volume = float(np.prod(size[:2] if robot.is_planar() else size))
-        volumes.append(found.inside * volume)
-        opens.append(found.open * volume)
-        finished &= found.finished
+        volumes.append(proof.inside * volume)
+        opens.append(proof.open * volume)
+        finished &= proof.finished
     unit = "m^2" if load_robot(original).is_planar() else "m^3"
     words = f"boxes of the frame proven inside, {boxes} judged"
     return Confirmation(goal, words, unit, volumes[0], volumes[1], opens[0], opens[1], finished)
@@ -154,8 +153,3 @@ def between(grid: WorkspaceGrid) -> WorkspaceGrid:
     counts = [1 if n == 1 else n + 1 for n in grid.shape[1:]]
     half = np.array([0.25 * (axis[1] - axis[0]) if len(axis) > 1 else 0.0 for axis in grid.axes])
     return grid_by_count(lower + half, upper - half, counts, [tuple(a) for a in grid.angles])
-
-
-def design_file(folder: Path) -> Path:
-    """Where the robot file of a design is, in a results folder."""
-    return folder / "design" / "robot.yaml"

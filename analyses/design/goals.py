@@ -87,16 +87,16 @@ def _least(name: str) -> Value:
     """Least over the poses; a pose at which the measure makes no sense has none: 0 or less."""
 
     def value(robot: Robot, judging: GoalContext) -> float:
-        found = _arrays(robot, judging, name)
-        return float(np.min(np.where(np.isfinite(found), found, 0.0)))
+        values = _arrays(robot, judging, name)
+        return float(np.min(np.where(np.isfinite(values), values, 0.0)))
 
     return value
 
 
 def _mean(name: str) -> Value:
     def value(robot: Robot, judging: GoalContext) -> float:
-        found = _arrays(robot, judging, name)
-        return float(np.mean(np.where(np.isfinite(found), found, 0.0)))
+        values = _arrays(robot, judging, name)
+        return float(np.mean(np.where(np.isfinite(values), values, 0.0)))
 
     return value
 

@@ -13,7 +13,6 @@ from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
-from cdpr_drake.analyses.design.maximin import SLOPES, Slopes
 from cdpr_drake.analyses.design.search import (
     DesignSearch,
     evaluate_original,
@@ -21,12 +20,9 @@ from cdpr_drake.analyses.design.search import (
     scores_of,
     search_design,
 )
+from cdpr_drake.analyses.design.search_methods import SLOPES, Slopes
 from cdpr_drake.analyses.design.settings import DesignSettings
-from cdpr_drake.analyses.reporting.progress import (
-    NOBODY_FOLLOWS,
-    WorkProgress,
-    WorkSession,
-)
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.workspaces.conditions import KINDS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError, accepted_names
@@ -63,9 +59,9 @@ class DesignProgram(OwnTerms):
     motor_torque [N m]. Costs count beside the goals' weighted sum with the sign changed, in which
     every goal is relative to the robot as it is.
 
-    A goal that is the least of smooth functions over the poses, of `maximin.SLOPES`, enters as
-    such, with exact slopes; others by differences. With nothing added `Solve` is `search_design`.
-    With own terms SNOPT seeks from the present robot.
+    A goal that is the least of smooth functions over the poses, of `search_methods.SLOPES`, enters
+    as such, with exact slopes; others by differences. With nothing added `Solve` is
+    `search_design`. With own terms SNOPT seeks from the present robot.
 
     Attributes:
         robot: The robot, or its name or path.
@@ -98,15 +94,15 @@ class DesignProgram(OwnTerms):
         self.candidates = make_candidates(name, settings, source)
         if self.candidates.size == 0:
             raise DesignError("design: found nothing that may move; accepted: a reach above 0")
-        if not 0 <= number < len(self.candidates.kept):
+        if not 0 <= number < len(self.candidates.cable_sets):
             raise DesignError(
-                f"number: found {number}; accepted: 0 to {len(self.candidates.kept) - 1}"
+                f"number: found {number}; accepted: 0 to {len(self.candidates.cable_sets) - 1}"
             )
         self._goals = tuple(goal.name for goal in settings.goals)
         self._refuse_counts(self._goals)
         self.judging = goal_context(robot, settings.poses, settings)
         self._original = evaluate_original(self.candidates, self.judging, self._goals)
-        self._told: dict[bytes, dict[str, float]] = {}
+        self._goals_at: dict[bytes, dict[str, float]] = {}
         self._values = self._read()
         self._prog = MathematicalProgram()
         self._z = self._prog.NewContinuousVariables(self.candidates.size, "design")
@@ -136,10 +132,10 @@ class DesignProgram(OwnTerms):
         if of is None:
             return every
         chosen: set[int] = set()
-        for one in [of] if isinstance(of, str) else of:
-            mine = [k for k, name in enumerate(names) if fnmatchcase(name, one)]
+        for pattern in [of] if isinstance(of, str) else of:
+            mine = [k for k, name in enumerate(names) if fnmatchcase(name, pattern)]
             if not mine:
-                raise DesignError(f"of: found {one!r}; {accepted_names(one, names)}")
+                raise DesignError(f"of: found {pattern!r}; {accepted_names(pattern, names)}")
             chosen |= set(mine)
         return every.only(np.array(sorted(chosen)))
 
@@ -166,26 +162,26 @@ class DesignProgram(OwnTerms):
         Raises:
             DesignError: No such goal, or one that is a count.
         """
-        asked = [goals] if isinstance(goals, str) else list(goals)
-        self._refuse_counts(asked)
+        names = [goals] if isinstance(goals, str) else list(goals)
+        self._refuse_counts(names)
 
         def cost(z: Array) -> Array:
-            return np.array([float(function(np.array([self._goal(g, z) for g in asked])))])
+            return np.array([float(function(np.array([self._goal(g, z) for g in names])))])
 
         binding = self._prog.AddCost(_CostOf(_ByDifferences(cost)), vars=self._z)
-        return self._named(binding, "cost", name or ", ".join(asked))
+        return self._named(binding, "cost", name or ", ".join(names))
 
-    def Solve(self, session: WorkSession = NOBODY_FOLLOWS) -> DesignSearch:
+    def Solve(self, follow: Follow = NOBODY) -> DesignSearch:
         """The design: two are in the result with own terms, the present robot and what was found.
 
         Args:
-            session: Of a search without own terms.
+            follow: Who follows a search without own terms.
 
         Raises:
             CdprError: As `search_design`; no design keeps the own constraints.
         """
         if not self.has_own_terms:
-            return search_design(self.robot, self.candidates, self.settings, session)
+            return search_design(self.robot, self.candidates, self.settings, follow=follow)
         start = np.zeros(self._prog.num_vars())
         places = self._prog.FindDecisionVariableIndices(self._z)
         start[places] = self._present()
@@ -197,15 +193,14 @@ class DesignProgram(OwnTerms):
         x, solver, said = self._solve_whole(start, "a design")
         designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
         values = np.array([
-            evaluate_goals(self.candidates.robot(self.number, one), self.judging, self._goals)
-            for one in designs
+            evaluate_goals(self.candidates.robot(self.number, design), self.judging, self._goals)
+            for design in designs
         ])  # fmt: skip
-        done = WorkProgress(said, 2, 2, 0.0, rate="designs/s", items="designs")
         return DesignSearch(
             self.candidates, self.settings, self.judging, self._original,
             np.full(2, self.number), designs, values,
-            scores_of(values, self._original, self.settings), done,
-            self._report(x, solver, said, (LOCAL,)),
+            scores_of(values, self._original, self.settings),
+            program=self._report(x, solver, said, (LOCAL,)),
         )  # fmt: skip
 
     def _add_goal(self, goal: str, weight: float) -> None:
@@ -225,18 +220,18 @@ class DesignProgram(OwnTerms):
         self._leasts.append((least, slopes))
 
     def _margins(self, slopes: Slopes, z: Array) -> tuple[Array, Array]:
-        found, by = slopes(self.candidates, self.number, self._shares(z), self.judging)
-        return found, by * self._share_slopes(z)
+        values, by = slopes(self.candidates, self.number, self._shares(z), self.judging)
+        return values, by * self._share_slopes(z)
 
     def _goal(self, goal: str, z: Array) -> float:
         """The value of a goal, in its unit."""
-        kept = self._told.setdefault(z.tobytes(), {})
-        if goal not in kept:
+        values = self._goals_at.setdefault(z.tobytes(), {})
+        if goal not in values:
             robot = self.candidates.robot(self.number, self._shares(z))
-            kept[goal] = GOALS[goal].value(robot, self.judging)
-        while len(self._told) > MOST_KEPT:
-            del self._told[next(iter(self._told))]
-        return kept[goal]
+            values[goal] = GOALS[goal].value(robot, self.judging)
+        while len(self._goals_at) > MOST_KEPT:
+            del self._goals_at[next(iter(self._goals_at))]
+        return values[goal]
 
     def _weights(self) -> Array:
         """Of the goals, each over its size of the robot as it is, as `scores_of`."""
@@ -261,9 +256,9 @@ class DesignProgram(OwnTerms):
         low, high = (points.displacements(np.full(points.size, end)) for end in (0.0, 1.0))
         scale, offset, names = [], [], []
         for k in range(points.size):
-            one = np.full(points.size, 0.5)
-            one[k] = 1.0
-            axis, column = np.argwhere(points.displacements(one).T != 0.0)[0][::-1]
+            moved = np.full(points.size, 0.5)
+            moved[k] = 1.0
+            axis, column = np.argwhere(points.displacements(moved).T != 0.0)[0][::-1]
             key = "exit_point" if column < m else "anchor_point"
             cable = cables[column % m]
             scale.append(high[axis, column] - low[axis, column])
@@ -287,18 +282,18 @@ class DesignProgram(OwnTerms):
 
     def _shares(self, z: Array) -> Array:
         """Coordinates of `Candidates`, whose winches are in ratios."""
-        found, first = np.array(z, float), self.candidates.points.size
+        shares, first = np.array(z, float), self.candidates.points.size
         for k, (low, high) in enumerate(self.candidates.ranges.values()):
-            found[first + k] = np.log(1.0 + (high / low - 1.0) * z[first + k]) / np.log(high / low)
-        return found
+            shares[first + k] = np.log(1.0 + (high / low - 1.0) * z[first + k]) / np.log(high / low)
+        return shares
 
     def _share_slopes(self, z: Array) -> Array:
         """How these grow with the variables, shape (size,)."""
-        found, first = np.ones(len(z)), self.candidates.points.size
+        slopes, first = np.ones(len(z)), self.candidates.points.size
         for k, (low, high) in enumerate(self.candidates.ranges.values()):
             more = high / low - 1.0
-            found[first + k] = more / (1.0 + more * z[first + k]) / np.log(high / low)
-        return found
+            slopes[first + k] = more / (1.0 + more * z[first + k]) / np.log(high / low)
+        return slopes
 
 
 class _ByDifferences(ProgramFunction):
@@ -347,5 +342,5 @@ class _Margins(ProgramFunction):
 
     def rows(self, x: Array) -> tuple[Array, Array]:
         """Numbers and derivatives."""
-        found, by = self._margins(np.clip(x[:-1], 0.0, 1.0))
-        return found - x[-1], np.hstack([by, np.full((len(found), 1), -1.0)])
+        values, by = self._margins(np.clip(x[:-1], 0.0, 1.0))
+        return values - x[-1], np.hstack([by, np.full((len(values), 1), -1.0)])

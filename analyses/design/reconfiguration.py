@@ -1,167 +1,92 @@
-"""Exit points of a robot on rails, put where a task is done best, and proven there.
+"""Exit points of a robot on rails, put where a task is done best, and proven there."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter, Token
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
+from cdpr_drake.analyses.design.rails import load_rails, put_rails, rails_of
+from cdpr_drake.analyses.frame.folder import Folder, results_folder
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import (
+    Formats,
+    InputFile,
+    Limits,
+    OutFolder,
+    RobotWord,
+    Switch,
+    Word,
+    one_of,
+    value_of,
+    with_word,
+    words,
+)
+from cdpr_drake.analyses.frame.words import (
+    poses as parse_poses,
+)
+from cdpr_drake.analyses.planning.path_files import path_poses
+from cdpr_drake.analyses.planning.plans import written
+from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import DataFileError, PlanningError, accepted_names
+from cdpr_drake.errors import PlanningError, WrenchSetError, accepted_names
 from cdpr_drake.geometry.poses import angles_from_rotation
-from cdpr_drake.models.exit_points import Rail
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_loader import as_robot, load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.reconfiguration import (
-    Rails,
+    STARTS,
     RailsSolution,
     RailTask,
     ReconfigurationProgram,
     tension_margins,
 )
 from cdpr_drake.planning.resistance import wrench_words
-from cdpr_drake.schema.fields import array, number, sections, texts
-from cdpr_drake.schema.typed_yaml import closest, load_typed
-from cdpr_drake.summaries import Summarized, numbers
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
 from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.static_feasibility import wrench_matrices
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 MARGIN, TENSION = "margin", "tension"
 RAIL_GOALS = (MARGIN, TENSION)
 """What is best: the largest margin of tensions to their limits, or the least largest tension."""
 
 AROUND, TURN, BOXES = 0.01, 1.0, 20_000
-"""Without other words: half widths of the box of poses round each that is proven [m, deg], and how
-many boxes of it are judged."""
+"""Defaults: half widths of the box of poses that is proven around each [m, deg], and how many boxes
+of it are judged."""
+
+SAMPLES = 9
+"""Poses of a path that are checked by default."""
 
 SUMMARY, ROBOT_FILE = "summary.json", "robot.yaml"
+
+PALE, DARK = "0.7", "0.15"
+"""Greys of the figure."""
 
 MISSED = 1e-7
 """Margins that are missed by less are kept: tolerance of the program."""
 
 
-@dataclass(kw_only=True)
-class RailSettings:
-    """A straight rail; exit points of several cables on it move together."""
-
-    cables: list[str] = texts("Cables that leave from it.")
-    axis: np.ndarray = array(
-        "Direction in W in which the coordinate grows; of any length.", "-", (3,)
-    )
-    lower: float = number("Smallest coordinate, counted from where the robot has its points.", "m")
-    upper: float = number("Largest coordinate.", "m")
-
-
-@dataclass(kw_only=True)
-class RailFile:
-    """Rails that a robot file does not have."""
-
-    rails: list[RailSettings] = sections("The rails.")
-
-
-def load_rails(path: Path) -> list[RailSettings]:
-    """Reads rails; keys as `RailFile`.
-
-    Raises:
-        DataFileError: The file cannot be read, or a value is not accepted.
-    """
-    if not path.is_file():
-        raise DataFileError(f"{path}: there is no such file of rails")
-    return load_typed(RailFile, path).rails
-
-
-def put_rails(robot: Robot, rails: Sequence[RailSettings], source: str = "rails") -> Robot:
-    """A robot with these rails in the place of its own, its points where they are.
-
-    Raises:
-        PlanningError: A cable is unknown, on two rails, or a rail has no direction or length.
-    """
-    found, names = deepcopy(robot), [cable.name for cable in robot.cables]
-    taken: set[str] = set()
-    for k, rail in enumerate(rails):
-        where = f"{source}: rails[{k}]"
-        if not np.any(rail.axis) or not rail.lower < rail.upper:
-            raise PlanningError(
-                f"{where}: found axis ({numbers(rail.axis)}), {rail.lower:g} to {rail.upper:g} m; "
-                "accepted: an axis that is not zero, lower < upper"
-            )
-        if not rail.cables:
-            raise PlanningError(f"{where}.cables: found none; accepted: names of cables")
-        for name in rail.cables:
-            if name not in names:
-                raise PlanningError(f"{where}.cables: {name!r} is unknown; {closest(name, names)}")
-            if name in taken:
-                raise PlanningError(f"{where}.cables: found {name} again; accepted: once")
-            taken.add(name)
-            cable = found.cables[names.index(name)]
-            cable.exit_point = robot.cable_set().p_WA[:, names.index(name)]
-            cable.rail = Rail(axis=np.array(rail.axis), lower=rail.lower, upper=rail.upper)
-    return found
-
-
-def rails_of(robot: Robot, groups: Sequence[Sequence[str]] = ()) -> tuple[Rails, list[str]]:
-    """Rails of a robot's file, and names of their coordinates.
-
-    Args:
-        robot: The robot.
-        groups: Names of cables that move together; all others that have rails move alone.
-
-    Raises:
-        PlanningError: It has none.
-    """
-    on_rails = {
-        cable.name: (k, cable.rail)
-        for k, cable in enumerate(robot.cables)
-        if cable.rail is not None
-    }
-    if not on_rails:
-        raise PlanningError(
-            f"robot {robot.name}: found no cables[].rail; accepted: rails in its file, or --rails"
-        )
-    grouped = {name for group in groups for name in group}
-    together = [*groups, *([name] for name in on_rails if name not in grouped)]
-    rows: list[tuple[float, float, float]] = []
-    directions = np.zeros((len(together), 3, len(robot.cables)))
-    for direction, group in zip(directions, together, strict=True):
-        for name in group:
-            k, rail = on_rails[name]
-            direction[:, k] = rail.axis / np.linalg.norm(rail.axis)
-        rows.append((rail.lower, rail.upper, rail.at))
-    lower, upper, at = np.array(rows).T
-    bases = np.array([cable.exit_point for cable in robot.cables], float).T
-    return Rails(directions, lower, upper, at, bases), [",".join(group) for group in together]
-
-
-@dataclass(frozen=True)
-class Around:
-    """Boxes of poses that are proven, one round each pose of a task.
-
-    Attributes:
-        position: Half width along each axis that the platform can move along [m].
-        turn: Half width of each angle that it can turn by [deg].
-        boxes: Boxes that are judged, at most, for each pose.
-    """
-
-    position: float = AROUND
-    turn: float = TURN
-    boxes: int = BOXES
-
-
 @dataclass(frozen=True)
 class PoseProof:
-    """What is proven round a pose.
+    """What is proven around a pose.
 
     Attributes:
         kind: Kind of `cdpr workspace --certify`.
@@ -177,7 +102,7 @@ class PoseProof:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class Reconfiguration(Summarized):
+class Reconfiguration(Result):
     """A robot whose exit points were moved along rails for a task.
 
     Attributes:
@@ -191,8 +116,10 @@ class Reconfiguration(Summarized):
             cables.
         over_pulleys: Margins of the new robot over its pulleys, shape (n,).
         tensions: Least largest tension of each pose under its worst wrench now, shape (n,) [N].
-        proofs: What is proven round each pose.
-        around: Where.
+        proofs: What is proven around each pose.
+        around: Half widths of the boxes of poses around each that are proven [m, deg].
+        folder: Results folder; None if nothing was kept.
+        failed: Of files that could not be written, the name and why.
     """
 
     before: Robot
@@ -205,7 +132,9 @@ class Reconfiguration(Summarized):
     over_pulleys: Array
     tensions: Array
     proofs: list[PoseProof]
-    around: Around
+    around: tuple[float, float]
+    folder: Path | None = None
+    failed: dict[str, str] = field(default_factory=dict)
 
     @property
     def geometry(self) -> str:
@@ -217,13 +146,13 @@ class Reconfiguration(Summarized):
 
     @property
     def proven(self) -> bool:
-        """Whether the boxes round all poses are proven."""
+        """True if the boxes around all poses are proven."""
         return all(proof.proven for proof in self.proofs)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         rails = self.task.rails
-        told: dict[str, Any] = finite({
+        result: dict[str, Any] = finite({
             "robot": self.before.name,
             "geometry": self.geometry,
             "goal": self.goal,
@@ -241,7 +170,7 @@ class Reconfiguration(Summarized):
             "wrenches": self.task.loads().shape[1],
             "solver": self.solution.solver,
             "proven": self.proven,
-            "proven_around_m_deg": [self.around.position, self.around.turn],
+            "proven_around_m_deg": list(self.around),
             "poses": [
                 {
                     "position_m": X.translation().tolist(),
@@ -257,33 +186,208 @@ class Reconfiguration(Summarized):
                 for k, (X, proof) in enumerate(zip(self.task.poses, self.proofs, strict=True))
             ],
         })  # fmt: skip
-        return told
+        return result
 
-    def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+    def tables(self) -> list[Table]:
+        """Rails."""
         rails = self.task.rails
-        moved = [
-            f"{name}: {a:.4g} to {b:.4g} m"
-            for name, a, b in zip(self.names, rails.at, self.solution.coordinates, strict=True)
-        ]
+        rows = [
+            (name, f"{a:.4f}", f"{b:.4f}", f"{low:g} to {high:g}")
+            for name, a, b, low, high in zip(
+                self.names, rails.at, self.solution.coordinates, rails.lower, rails.upper,
+                strict=True,
+            )
+        ]  # fmt: skip
+        title = f"{self.before.name}: exit points moved along rails"
+        return [Table(title, ("cables", "from [m]", "to [m]", "ends [m]"), rows)]
+
+    def lines(self) -> list[str]:
+        """Margins, tensions and proofs."""
         before, now = np.min(self.margins, axis=1)
         inside = min(proof.inside for proof in self.proofs)
-        return f"{self.before.name}, exit points moved along rails", [
-            ("rails", "; ".join(moved)),
-            ("margin", f"{before:.4f} before, {now:.4f} now, of half the range"),
-            ("geometry", self.geometry),
-            ("over pulleys", f"{np.min(self.over_pulleys):.4f}"),
-            ("largest tension", f"{np.max(self.tensions):.4g} N"),
-            ("proven", "all" if self.proven else f"{inside:.1%} round the worst pose"),
+        position, turn = self.around
+        verdict = "proven" if self.proven else f"NOT PROVEN, {inside:.1%} at the worst pose"
+        return [
+            f"cables: {self.geometry}",
+            f"least margin of {len(self.task.poses)} poses under {self.task.loads().shape[1]} "
+            f"wrenches: {before:.4f} before, {now:.4f} now, {np.min(self.over_pulleys):.4f} over "
+            f"pulleys, of half the range of tensions; tensions to {np.max(self.tensions):.4g} N do",
+            f"all poses within {position:g} m, {turn:g} deg of each: {verdict}",
+            *([] if self.folder is None else [f"robot: {self.folder / ROBOT_FILE}"]),
         ]
 
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes summary and robot file into an existing folder; returns the summary."""
-        write_whole(folder / ROBOT_FILE, yaml_dump_typed(self.after))
-        load_robot(str(folder / ROBOT_FILE))
-        told = self.as_dict()
-        write_json(folder / SUMMARY, told)
-        return told
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """Rails, exit points before and after, and margins of all poses."""
+        return {"rails": self._draw}
+
+    def _draw(self) -> Figure:
+        from cdpr_drake.analyses.visualization.figure_style import bare_figure, styled
+
+        figure = bare_figure(
+            (11.0, 6.0),
+            f"{self.before.name}: exit points on rails, before and after, and margins\n"
+            f"{self.geometry}",
+        )
+        with styled():
+            # A column between them: labels of axes in space are outside what a layout counts.
+            grid = figure.add_gridspec(1, 3, width_ratios=(1.2, 0.08, 1.0))
+            self._draw_rails(figure.add_subplot(grid[0], projection="3d"))
+            self._draw_margins(figure.add_subplot(grid[2]))
+        return figure
+
+    def _draw_rails(self, space: Any) -> None:
+        """Rails, exit points before and after with cables to the first pose."""
+        rails, task = self.task.rails, self.task
+        before, after = (rails.exit_points(at) for at in (rails.at, self.solution.coordinates))
+        ends = rails.exit_points(rails.lower), rails.exit_points(rails.upper)
+        for k in range(before.shape[1]):
+            rail = np.array([ends[0][:, k], ends[1][:, k]]).T
+            if np.any(rail[:, 0] != rail[:, 1]):
+                space.plot(*rail, color=PALE, linewidth=4.0, label="rail" if k == 0 else None)
+        space.plot(*before, "o", color=DARK, markerfacecolor="none", label="exit point before")
+        space.plot(*after, "o", color=DARK, label="exit point after")
+        X = task.poses[0]
+        p_WB = X.translation()[:, None] + X.rotation().matrix() @ task.case.cables.p_PB
+        for k in range(before.shape[1]):
+            label = "cable at pose 1" if k == 0 else None
+            space.plot(*np.array([after[:, k], p_WB[:, k]]).T, "-", linewidth=0.8, color=DARK,
+                       label=label)  # fmt: skip
+        places = np.array([Y.translation() for Y in task.poses]).T
+        space.plot(*places, "x", color=DARK, label="Po at the poses")
+        space.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
+        space.set_aspect("equal")
+        space.legend(loc="upper left", bbox_to_anchor=(-0.2, 1.05), ncols=1, fontsize="small")
+
+    def _draw_margins(self, bars: Any) -> None:
+        """Margins of all poses before and after."""
+        number = np.arange(1, len(self.task.poses) + 1)
+        for shift, values, colour, hatch, label in (
+            (-0.2, self.margins[0], "white", "//", "before"),
+            (0.2, self.margins[1], DARK, "", "after"),
+        ):
+            bars.bar(
+                number + shift, values, 0.4, color=colour, edgecolor=DARK, hatch=hatch, label=label
+            )
+        bars.plot(
+            number + 0.2, self.over_pulleys, "D", color="white", markeredgecolor=DARK,
+            markersize=5.0, linestyle="none", label="after, over pulleys",
+        )  # fmt: skip
+        bars.axhline(0.0, color=DARK, linewidth=0.8)
+        bars.set(
+            xlabel="pose", ylabel="margin under the worst wrench,\nshare of half the range [-]"
+        )
+        bars.set_xticks(number)
+        bars.legend(loc="best")
+
+    def write(self, folder: Folder) -> None:
+        """Writes the robot file and the summary."""
+        folder.write_text(ROBOT_FILE, yaml_dump_typed(self.after))
+        load_robot(str(folder.path / ROBOT_FILE))
+        folder.write_json(SUMMARY, self.as_dict())
+
+
+_POSES = words(
+    with_word(parse_poses), "poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them",
+    "POSES",
+)  # fmt: skip
+
+
+def _task(kind: Any, tokens: Sequence[Token]) -> Any:
+    """Poses behind --poses, a file behind --path."""
+    if tokens[0].keyword == "--path":
+        return Path(tokens[0].value)
+    return _POSES.converter(kind, tokens)  # type: ignore[misc, operator]
+
+
+PosesWord = Annotated[
+    Any, Parameter(name=("--poses", "--path"), converter=_task, n_tokens=1, metavar="POSES|FILE")
+]
+
+
+@verb()
+def reconfigure(
+    robot: RobotWord, *, poses: PosesWord, rails: InputFile = None, samples: int = SAMPLES,
+    resist: InputFile = None, goal: Annotated[str, one_of(RAIL_GOALS)] = MARGIN,
+    limits: Limits = None, starts: int = STARTS, around: float = AROUND, turn: float = TURN,
+    boxes: int = BOXES, folder: OutFolder = None, overwrite: Switch = False,
+    formats: Formats = DEFAULT_FORMATS,
+    follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
+) -> Reconfiguration:  # fmt: skip
+    """Places exit points along rails so that poses or a path are feasible or best, with a proof.
+
+    If no position on the rails works, the message names the pose and the wrench. Cables are taken
+    as straight from their exit points; whether they collide is not checked.
+
+    Args:
+        robot: Robot by name or file.
+        poses: Poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them, or a path: a file,
+            CSV or G-code as of cdpr plan --path.
+        rails: YAML file of rails: cables, axis, lower, upper; default: those of the robot file.
+        samples: Number of poses of a path that are checked, on straight lines and arcs.
+        resist: Wrenches to resist at each pose [N m, N], YAML as of cdpr plan --resist.
+        goal: margin: the largest margin of tensions; tension: the least largest tension.
+        limits: Smallest and largest tension [N]; default: the robot's.
+        starts: Number of starting points of the optimisation.
+        around: Half width of the box of positions that is proven around each pose [m].
+        turn: Half width of the angles that are proven around each pose [deg].
+        boxes: Largest number of boxes to judge for each pose.
+        folder: Results folder, with robot.yaml, which has the new exit points, summary.json and a
+            figure; default: rails/ROBOT, or ROBOT-2, ...; in Python nothing is kept.
+        overwrite: Replace earlier results in the folder.
+        formats: Formats of the figure in the folder.
+        follow: Who follows the work.
+
+    Raises:
+        PlanningError: No position of the rails does it, or an argument is not accepted.
+        CdprError: A file cannot be read, or the robot is not accepted.
+        OutputFolderError: The folder holds other results or files, or cannot be written.
+    """
+    loaded, groups = as_robot(robot, "reconfigure"), list[list[str]]()
+    if rails is not None:
+        of_file = isinstance(rails, str | Path)
+        settings = load_rails(Path(rails)) if of_file else list(rails)
+        loaded = put_rails(loaded, settings, str(rails) if of_file else "rails")
+        groups = [list(rail.cables) for rail in settings]
+        moved = {name for group in groups for name in group}
+        for cable in loaded.cables:  # rails that are given take the place of all of the robot's
+            if cable.rail is not None and cable.name not in moved:
+                cable.exit_point, cable.rail = cable.exit_point + cable.rail.shift(), None
+    X_WP = _task_poses(loaded, poses, samples)
+    wrenches = load_wrench_set(Path(resist)) if isinstance(resist, str | Path) else resist
+    arguments = {
+        "robot": loaded.name, "rails": str(rails), "poses": [pose_in_degrees(X) for X in X_WP],
+        "resist": str(resist), "goal": goal, "limits": limits, "starts": starts,
+        "around": [around, turn, boxes],
+    }  # fmt: skip
+    name = f"rails/{loaded.name}"
+    with results_folder(name, arguments, folder, overwrite, follow.results) as results:
+        try:
+            solution = reconfigured(
+                loaded, X_WP, wrenches, groups, goal=goal, limits=limits, starts=starts,
+                around=(around, turn), boxes=boxes, say=follow.doing,
+            )  # fmt: skip
+        except WrenchSetError as problem:
+            if wrenches is resist:
+                raise
+            raise WrenchSetError(f"{resist}: {problem}") from problem
+        if results is not None:
+            solution = replace(solution, folder=results.path)
+            written(solution, results, formats, follow)
+        return solution
+
+
+def _task_poses(robot: Robot, poses: Any, samples: int) -> list[RigidTransform]:
+    """Poses themselves, or `samples` of a path from a file."""
+    if isinstance(poses, Word) or not isinstance(poses, Path | str):
+        result = [as_pose(robot, pose) for pose in value_of(poses)]
+        if not result:
+            raise PlanningError("poses: found none; accepted: at least 1")
+        return result
+    if samples < 2:
+        raise PlanningError(f"samples: found {samples}; accepted: at least 2")
+    read = path_poses(robot, poses)
+    path = make_path(robot, read.poses, "rest", moves=read.moves)
+    return [path.pose(float(s)) for s in np.linspace(0.0, path.length, samples)]
 
 
 def reconfigured(
@@ -294,9 +398,10 @@ def reconfigured(
     *,
     goal: str = MARGIN,
     limits: tuple[float, float] | None = None,
-    starts: int = 5,
-    around: Around | None = None,
-    say: Callable[[str], None] | None = None,
+    starts: int = STARTS,
+    around: tuple[float, float] = (AROUND, TURN),
+    boxes: int = BOXES,
+    say: Callable[[str], None] = lambda words: None,
 ) -> Reconfiguration:
     """Puts exit points of a robot along its rails for poses, and proves what is round these.
 
@@ -308,8 +413,9 @@ def reconfigured(
         goal: One of `RAIL_GOALS`.
         limits: Smallest and largest tension [N]; None: the robot's.
         starts: Of the program.
-        around: Boxes of poses that are proven.
-        say: Told what is done now.
+        around: Half widths of the box of poses that is proven around each [m, deg].
+        boxes: Boxes that are judged, at most, for each pose.
+        say: Called with words for what is done now.
 
     Raises:
         PlanningError: No position of the rails does it; names pose and wrench. Or something is not
@@ -320,39 +426,38 @@ def reconfigured(
         raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
     if starts < 1:
         raise PlanningError(f"starts: found {starts}; accepted: at least 1")
-    where, tell = around or Around(), say or (lambda words: None)
-    if not (where.position > 0.0 and where.turn >= 0.0 and where.boxes >= 1):
+    if not (around[0] > 0.0 and around[1] >= 0.0 and boxes >= 1):
         raise PlanningError(
-            f"around: found {where.position:g} m, {where.turn:g} deg, {where.boxes} boxes; "
-            "accepted: above 0, at least 0, at least 1"
+            f"around: found {around[0]:g} m, {around[1]:g} deg, {boxes} boxes; accepted: above 0, "
+            "at least 0, at least 1"
         )
     rails, names = rails_of(robot, groups)
     task = RailTask(static_case(robot, limits, pulleys=False), rails, list(poses), required)
-    tell(f"Moving exit points of {robot.name}")
+    say(f"Moving exit points of {robot.name}")
     program = ReconfigurationProgram(task)
     program.AddLargestMargin()
-    found = program.Solve(starts)
-    margins = task.margins(found.coordinates)
+    solution = program.Solve(starts)
+    margins = task.margins(solution.coordinates)
     if not np.min(margins) >= -MISSED:
         raise PlanningError(_impossible(task, margins))
     if goal == TENSION:
         program = ReconfigurationProgram(task)
         program.AddLeastLargestTension()
-        found = program.Solve(starts)
-        margins = task.margins(found.coordinates)
-    if not found.success:
+        solution = program.Solve(starts)
+        margins = task.margins(solution.coordinates)
+    if not solution.success:
         raise PlanningError(
-            f"rails: {found.solver}: {found.status}; accepted: other rails or poses"
+            f"rails: {solution.solver}: {solution.status}; accepted: other rails or poses"
         )
-    after = _moved(robot, names, found.coordinates)
+    after = _moved(robot, names, solution.coordinates)
     case = static_case(after, limits, pulleys=False)
-    tell("Proving what is round the poses")
+    say("Proving what is around the poses")
     return Reconfiguration(
-        before=robot, after=after, task=task, goal=goal, names=names, solution=found,
+        before=robot, after=after, task=task, goal=goal, names=names, solution=solution,
         margins=np.array([np.min(task.margins(rails.at), axis=1), np.min(margins, axis=1)]),
         over_pulleys=_over_pulleys(task, after, limits),
-        tensions=np.max(task.largest_tensions(found.coordinates), axis=1),
-        proofs=[_proof(case, X, required, where) for X in task.poses], around=where,
+        tensions=np.max(task.largest_tensions(solution.coordinates), axis=1),
+        proofs=[_proof(case, X, required, around, boxes) for X in task.poses], around=around,
     )  # fmt: skip
 
 
@@ -360,9 +465,9 @@ def _impossible(task: RailTask, margins: Array) -> str:
     k, c = divmod(int(np.argmin(margins)), margins.shape[1])
     corners = np.zeros((1, 6))
     if task.required is not None:
-        found = task.required.corners(task.case.rows)
-        corners = np.zeros((len(found), 6))
-        corners[:, list(task.case.rows)] = found
+        rows = task.required.corners(task.case.rows)
+        corners = np.zeros((len(rows), 6))
+        corners[:, list(task.case.rows)] = rows
     place = ", ".join(f"{x:.4g}" for x in task.poses[k].translation())
     return (
         f"rails: found none of their positions for pose {k + 1} of {len(task.poses)}, ({place}) m, "
@@ -373,14 +478,14 @@ def _impossible(task: RailTask, margins: Array) -> str:
 
 
 def _moved(robot: Robot, names: list[str], coordinates: Array) -> Robot:
-    found = deepcopy(robot)
-    by_name = {cable.name: cable for cable in found.cables}
+    result = deepcopy(robot)
+    by_name = {cable.name: cable for cable in result.cables}
     for group, value in zip(names, coordinates, strict=True):
         for name in group.split(","):
             rail = by_name[name].rail
             assert rail is not None
             rail.at = float(min(max(value, rail.lower), rail.upper))
-    return found
+    return result
 
 
 def _over_pulleys(task: RailTask, robot: Robot, limits: tuple[float, float] | None) -> Array:
@@ -392,17 +497,16 @@ def _over_pulleys(task: RailTask, robot: Robot, limits: tuple[float, float] | No
 
 
 def _proof(
-    case: Any, X_WP: RigidTransform, required: SpatialSet | None, around: Around
-) -> PoseProof:
-    """Boxes round a pose, of straight cables from the exit points."""
+    case: Any, X_WP: RigidTransform, required: SpatialSet | None, around: tuple[float, float],
+    boxes: int,
+) -> PoseProof:  # fmt: skip
+    """Boxes around a pose, of straight cables from the exit points."""
     kind = CertifiedKind.STATIC if required is None else CertifiedKind.WRENCH_FEASIBLE
     middle = np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
     half = np.zeros(6)
     for row in case.rows:
-        half[row + 3 if row < 3 else row - 3] = (
-            np.radians(around.turn) if row < 3 else around.position
-        )
+        half[row + 3 if row < 3 else row - 3] = np.radians(around[1]) if row < 3 else around[0]
     task = CertifyTask(kind, case, required or SpatialSet())
-    boxes = certify(task, PoseBox(middle - half, middle + half), around.boxes)
-    proven = bool(np.all(boxes.verdicts == INSIDE))
-    return PoseProof(kind.value, boxes.inside, boxes.outside, proven)
+    result = certify(task, PoseBox(middle - half, middle + half), boxes)
+    proven = bool(np.all(result.verdicts == INSIDE))
+    return PoseProof(kind.value, result.inside, result.outside, proven)

@@ -1,24 +1,32 @@
-"""The search for a design: generations of candidates, each one a task of a sweep that is kept."""
+"""The search for a design: generations of candidates, each of which is kept as it is judged."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import json
+import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cdpr_drake.analyses.design.candidates import Candidates
-from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
 from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
-from cdpr_drake.analyses.design.maximin import SLOPES, Slopes, SlopeSearch
+from cdpr_drake.analyses.design.search_methods import (
+    SLOPES,
+    EvolutionSearch,
+    Slopes,
+    SlopeSearch,
+    default_population,
+    pareto_front,
+)
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
-from cdpr_drake.analyses.reporting.progress import NOBODY_FOLLOWS, WorkProgress, WorkSession
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
+from cdpr_drake.analyses.frame.jobs import Processes, finished_jobs
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.sweeps.folder import SweepFolder
-from cdpr_drake.analyses.sweeps.sweep import STARTING, run_sweep
-from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
@@ -26,31 +34,12 @@ from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import ProgramReport
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import grid_by_count
 
-
-@dataclass(frozen=True, eq=False)
-class DesignTask:
-    """Sweep task: the goals of the designs of a generation; NaN where a design cannot be."""
-
-    candidates: Candidates
-    number: int
-    coordinates: Array
-    names: tuple[str, ...]
-    judging: GoalContext
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Array `values` of the designs start to stop, shape (n, goals), larger is better."""
-        values = np.full((stop - start, len(self.names)), np.nan)
-        for row, x in zip(values, self.coordinates[start:stop], strict=True):
-            try:
-                row[:] = evaluate_goals(
-                    self.candidates.robot(self.number, x), self.judging, self.names
-                )
-            except CdprError:
-                continue  # no robot at all, or one that cannot be asked
-        return {"values": values}
+JUDGED = "judged.jsonl"
+"""Goals of each design, a line each, as it is judged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +55,9 @@ class DesignSearch:
         coordinates: The designs, in the order of the search, shape (n, size).
         values: Their goals, larger is better, shape (n, goals).
         scores: Weighted sums, as `scores_of`, shape (n,).
-        progress: Where the search stood at the end.
+        complete: True if it was not stopped.
+        earlier: How many of the designs an earlier command had judged.
+        wall_time: Time that the search took [s].
         program: Of a `DesignProgram` with own terms, how it was solved; None: by a search.
     """
 
@@ -78,7 +69,9 @@ class DesignSearch:
     coordinates: Array
     values: Array
     scores: Array
-    progress: WorkProgress
+    complete: bool = True
+    earlier: int = 0
+    wall_time: float = 0.0
     program: ProgramReport | None = None
 
     @property
@@ -95,11 +88,6 @@ class DesignSearch:
     def front(self) -> np.ndarray:
         """Numbers of the designs that no other one is better than in everything."""
         return np.flatnonzero(pareto_front(self.values))
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the end."""
-        return self.progress.done < self.progress.total
 
 
 def goal_context(robot: Robot | str, poses: PosesSettings, settings: DesignSettings) -> GoalContext:
@@ -160,57 +148,52 @@ def search_design(
     robot: Robot | str,
     candidates: Candidates,
     settings: DesignSettings,
-    session: WorkSession = NOBODY_FOLLOWS,
+    folder: Folder | None = None,
+    *,
+    workers: int | str | None = 1,
+    follow: Follow = NOBODY,
 ) -> DesignSearch:
-    """Searches the best design of each set of cables by CMA-ES.
+    """Searches the best design of each set of cables by evolution, or by slopes.
 
-    With a folder in the session it continues where it was stopped or killed: designs judged are
-    kept one by one, and the search is replayed from them.
+    With a folder that an earlier search of the same arguments has left the search goes on: designs
+    are kept one by one, and the search, which follows from their goals, is replayed.
 
     Args:
         robot: The robot, or its name or path.
         candidates: What it may become.
         settings: What is wanted.
-        session: How it is run; without a number of workers one, whose kernels use all processors.
+        folder: Open folder of `search_arguments`; None: nothing is kept.
+        workers: As of `finished_jobs`; the kernels of one process use all processors.
+        follow: Who follows.
 
     Raises:
-        OutputFolderError: The folder belongs to other arguments, or cannot be written.
+        OutputFolderError: The folder cannot be written.
         CdprError: The robot cannot be asked for a goal.
     """
     slopes = _slopes_of(settings)
     judging = goal_context(robot, settings.poses, settings)
     names = tuple(goal.name for goal in settings.goals)
     original = evaluate_original(candidates, judging, names)
-    population = settings.population or default_population(candidates.size)
-    rounds = settings.generations if candidates.size else 1
-    each = population if candidates.size and slopes is None else 1
-    total = len(candidates.kept) * rounds * each
-    folder = None
-    if session.folder is not None:
-        folder = SweepFolder(session.folder, search_arguments(candidates, settings, judging))
-    # Each generation is a sweep of its own, for which no process shall be started anew.
-    with PersistentPool(session.workers or 1) as pool:
-        record = _Record(session, lambda values: scores_of(values, original, settings), total, pool)
-        for number in range(len(candidates.kept)):
-            task = DesignTask(candidates, number, np.zeros((0, 0)), names, judging)
+    search = _Search(candidates, settings, judging, names, original, folder, workers, follow)
+    with search.standing:
+        for number in range(len(candidates.cable_sets)):
             if candidates.size and slopes is not None:
-                _ascend(record, folder, slopes, task, rounds)
+                complete = search.by_slopes(number, slopes)
             else:
-                _evolve(record, folder, task, (each, settings.seed), rounds)
-            if record.stopped:
+                complete = search.by_evolution(number)
+            if not complete:
                 break
-    if folder is not None and not record.stopped:
-        folder.finish(record.kept)
-    values = np.array(record.values).reshape(-1, len(names))
-    designs = np.array(record.designs).reshape(-1, candidates.size)
+    values = np.array(search.values).reshape(-1, len(names))
     return DesignSearch(
-        candidates, settings, judging, original, np.array(record.sets, int), designs, values,
-        scores_of(values, original, settings), record.progress,
+        candidates, settings, judging, original, np.array(search.sets, int),
+        np.array(search.designs).reshape(-1, candidates.size), values,
+        scores_of(values, original, settings), complete, search.earlier,
+        time.perf_counter() - search.count.began,
     )  # fmt: skip
 
 
 def _slopes_of(settings: DesignSettings) -> Slopes | None:
-    """Slopes of the only goal, where they are asked for; None by evolution.
+    """Slopes of the only goal, if they are asked for; None by evolution.
 
     Raises:
         DesignError: There are none of what is wanted.
@@ -226,117 +209,151 @@ def _slopes_of(settings: DesignSettings) -> Slopes | None:
     return SLOPES[names[0]]
 
 
-def _evolve(
-    record: _Record,
-    folder: SweepFolder | None,
-    like: DesignTask,
-    drawn: tuple[int, int],
-    rounds: int,
-) -> None:
-    """Seeks the best design of a set of cables by evolution, `drawn`: population and seed; a set
-    that cannot change is judged once."""
-    search = None
-    if like.candidates.size:
-        search = EvolutionSearch(like.candidates.size, *drawn)
-    for generation in range(rounds):
-        X = np.zeros((1, 0)) if search is None else search.ask()
-        name = f"set{like.number}-generation{generation:04d}"
-        values = record.judge(name, replace(like, coordinates=X), folder)
-        if values is None:
-            return
-        if search is not None:
-            search.tell(record.score(values))
+def judged(
+    candidates: Candidates, names: tuple[str, ...], judging: GoalContext,
+    design: tuple[int, Array],
+) -> list[float]:  # fmt: skip
+    """Goals of a design, a set of cables and coordinates, larger is better; NaN if it cannot be."""
+    try:
+        return evaluate_goals(candidates.robot(*design), judging, names).tolist()
+    except CdprError:  # no robot at all, or one that cannot be asked
+        return [np.nan] * len(names)
 
 
-def _ascend(
-    record: _Record, folder: SweepFolder | None, slopes: Slopes, like: DesignTask, most: int
-) -> None:
-    """Seeks the best design of a set of cables by slopes, one design after the other.
-
-    Slopes are reckoned again where a search continues: they follow from the design.
-    """
-    search = SlopeSearch(like.candidates.size)
-    for step in range(most):
-        design = search.ask()
-        name = f"set{like.number}-step{step:04d}"
-        values = record.judge(name, replace(like, coordinates=design[np.newaxis]), folder)
-        if values is None:
-            return
-        value = float(values[0, 0])
-        every, by = np.empty(0), np.empty((0, len(design)))
-        if search.wants_slopes(value):
-            every, by = slopes(like.candidates, like.number, design, like.judging)
-        search.tell(value, every, by)
-        if search.ended:
-            record.shorten(most - step - 1)
-            return
-
-
-class _Record:
+class _Search:
     """What was judged so far, and where the search stands."""
 
     def __init__(
-        self,
-        session: WorkSession,
-        score: Callable[[Array], Array],
-        total: int,
-        pool: PersistentPool,
-    ) -> None:
+        self, candidates: Candidates, settings: DesignSettings, judging: GoalContext,
+        names: tuple[str, ...], original: Array, folder: Folder | None, workers: int | str | None,
+        follow: Follow,
+    ) -> None:  # fmt: skip
         self.sets: list[int] = []
         self.designs: list[Array] = []
         self.values: list[Array] = []
-        self.kept: dict[str, dict[str, np.ndarray]] = {}
-        self.stopped = False
-        self.progress = WorkProgress(STARTING, 0, total, 0.0, rate="designs/s", items="designs")
-        self.score, self._session, self._pool = score, session, pool
-        self._best, self._wall, self._earlier = -np.inf, 0.0, 0.0
+        self.standing = Processes()
+        self.earlier = 0
+        self._candidates, self._settings, self._judging = candidates, settings, judging
+        self._original, self._folder, self._workers = original, folder, workers
+        self._work = partial(judged, candidates, names, judging)
+        self._follow, self._best, self._said = follow, -np.inf, set[str]()
+        self._known = {} if folder is None or not folder.resumed else _read(folder.path / JUDGED)
+        if folder is not None and self._known:  # without a line that a kill has cut
+            lines = (json.dumps(item) + "\n" for item in self._known.items())
+            folder.write_text(JUDGED, "".join(lines))
+        slopes = settings.search == BY_SLOPES
+        self._population = settings.population or default_population(candidates.size)
+        each = self._population if candidates.size and not slopes else 1
+        rounds = settings.generations if candidates.size else 1
+        total = len(candidates.cable_sets) * rounds * each
+        self.count = Count(follow, total, min(len(self._known), total), unit="designs")
 
-    def judge(self, name: str, task: DesignTask, folder: SweepFolder | None) -> Array | None:
-        """Goals of a generation; None where it was stopped before its end."""
-        count, session = len(task.coordinates), self._session
-        result = run_sweep(
-            {name: (task, count)}, 1, folder, items="designs", standing=self._pool,
-            scheduler=session.scheduler, on_progress=self._show, should_stop=session.should_stop,
-        )  # fmt: skip
-        self._show(result.progress)
-        self._wall += result.progress.wall_time
-        self._earlier += result.progress.found
-        if result.arrays is None:
-            self.stopped = True
+    def by_evolution(self, number: int) -> bool:
+        """Seeks the best design of a set of cables; a set that cannot change is judged once.
+
+        Returns:
+            False if it was stopped.
+        """
+        size, settings = self._candidates.size, self._settings
+        search = EvolutionSearch(size, self._population, settings.seed) if size else None
+        for generation in range(settings.generations if size else 1):
+            X = np.zeros((1, 0)) if search is None else search.ask()
+            values = self._judge(f"set{number}-generation{generation:04d}", number, X)
+            if values is None:
+                return False
+            if search is not None:
+                search.tell(self._scores(values))
+        return True
+
+    def by_slopes(self, number: int, slopes: Slopes) -> bool:
+        """Seeks the best design of a set of cables, one design after the other.
+
+        Slopes are computed again when a search goes on: they follow from the design.
+
+        Returns:
+            False if it was stopped.
+        """
+        search, most = SlopeSearch(self._candidates.size), self._settings.generations
+        for step in range(most):
+            design = search.ask()
+            values = self._judge(f"set{number}-step{step:04d}", number, design[np.newaxis])
+            if values is None:
+                return False
+            value = float(values[0, 0])
+            every, by = np.empty(0), np.empty((0, len(design)))
+            if search.wants_slopes(value):
+                every, by = slopes(self._candidates, number, design, self._judging)
+            search.tell(value, every, by)
+            if search.ended:
+                self.count.total -= most - step - 1
+                break
+        return True
+
+    def _judge(self, name: str, number: int, X: Array) -> Array | None:
+        """Goals of designs, shape (n, goals); None if it was stopped before all were judged."""
+        keys = [f"{name}-{k}" for k in range(len(X))]
+        lacking = [k for k, key in enumerate(keys) if key not in self._known]
+        self.earlier += len(X) - len(lacking)
+        for finished in finished_jobs(
+            self._work, [(number, X[k]) for k in lacking], self._workers, stop=self._follow.stop,
+            say=self._say, name="design", standing=self.standing,
+        ):  # fmt: skip
+            if finished.problem is not None:
+                raise finished.problem
+            self._keep(keys[lacking[finished.number]], finished.result or [])
+            best = f"best {self._best:.4g}" if np.isfinite(self._best) else name
+            self.count.add(1, best)
+        values = [self._known[key] for key in keys if key in self._known]
+        if len(values) < len(X):
             return None
-        values = result.arrays[name]["values"]
-        self.kept |= result.arrays
-        self.sets += [task.number] * count
-        self.designs += list(task.coordinates)
-        self.values += list(values)
-        self._best = max([self._best, *self.score(values)[np.all(np.isfinite(values), axis=1)]])
-        return values
+        goals = np.array(values, float).reshape(len(X), -1)
+        self.sets += [number] * len(X)
+        self.designs += list(X)
+        self.values += list(goals)
+        finite = np.all(np.isfinite(goals), axis=1)
+        self._best = max([self._best, *self._scores(goals)[finite]])
+        return goals
 
-    def shorten(self, by: int) -> None:
-        """So many designs less are left to judge than were thought."""
-        self.progress = replace(self.progress, total=self.progress.total - by)
+    def _say(self, words: str) -> None:
+        """Says words of a cluster once, not in each generation."""
+        if words not in self._said:
+            self._said.add(words)
+            self._follow.say(words)
 
-    def _show(self, progress: WorkProgress) -> None:
-        words = f"best {self._best:.4g}" if np.isfinite(self._best) else STARTING
-        self.progress = replace(
-            self.progress, what=words, done=len(self.values) + progress.done,
-            wall_time=self._wall + progress.wall_time, found=self._earlier + progress.found,
-        )  # fmt: skip
-        if self._session.on_progress is not None:
-            self._session.on_progress(self.progress)
+    def _keep(self, key: str, values: list[float]) -> None:
+        self._known[key] = values
+        if self._folder is not None:
+            with self._folder.writing(), self._folder.claim(JUDGED).open("a") as file:
+                file.write(json.dumps([key, values]) + "\n")
+
+    def _scores(self, values: Array) -> Array:
+        return scores_of(values, self._original, self._settings)
+
+
+def _read(path: Path) -> dict[str, list[float]]:
+    """Goals of judged designs by their keys; a line that a kill has cut does not count.
+
+    Raises:
+        DesignError: A line is none that this program wrote.
+    """
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
+    try:
+        return dict(load_json(line) for line in lines if line.endswith("\n"))
+    except (ValueError, TypeError) as problem:
+        raise DesignError(f"{path}: found no lines of a search: {problem}") from problem
 
 
 def search_arguments(
     candidates: Candidates, settings: DesignSettings, judging: GoalContext
 ) -> dict[str, Any]:
     """All that the numbers depend on, for JSON."""
-    found: dict[str, Any] = plain(
+    arguments: dict[str, Any] = plain(
         {
             "cdpr_drake": code_version(),
             "robot": candidates.text,
-            "settings": replace(settings, generations=1),  # more of them continue
+            "settings": replace(settings, generations=1),  # more of them go on
             "grid": judging.grid,
             "bounds": judging.bounds.as_dict(),
         }
     )
-    return found
+    return arguments

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.analyses.design.moved_points import AXES
 from cdpr_drake.errors import DesignError
 from cdpr_drake.schema.fields import array, number, section, sections, text, texts, whole
 from cdpr_drake.schema.typed_yaml import load_typed
+
+AXES = {"x": (0,), "y": (1,), "z": (2,), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+"""Symmetries by name: normals of planes, and axes that half a turn turns round."""
 
 EVOLUTION, BY_SLOPES = "evolution", "slopes"
 SEARCHES = (EVOLUTION, BY_SLOPES)

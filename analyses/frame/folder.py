@@ -21,11 +21,15 @@ from filelock import FileLock, Timeout
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.schema.input_files import inputs_held
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
 
 MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
 """The marker, the lock, and what the name of a file in the making begins with."""
+
+INPUTS = "inputs.json"
+"""Files of users that the results follow from, with their SHA-256 and sizes [byte]."""
 
 LONGEST_VALUE = 60
 """Longer JSON values are not quoted in refusals [characters]."""
@@ -194,7 +198,11 @@ class Folder:
         return failed
 
     def complete(self) -> None:
-        """Marks the results as complete."""
+        """Marks the results as complete, and writes hashes of the files of users that were read."""
+        files = inputs_held()
+        hashes = {} if files is None else files.hashes(self.path)
+        if hashes:
+            self.write_json(INPUTS, hashes)
         with self.writing():
             self._mark(complete=True)
 
@@ -259,6 +267,28 @@ def free_folder(base: Path, arguments: Mapping[str, Any]) -> Path:
         if not path.exists() or (goes_on and not is_locked(path)):
             return path
     raise AssertionError
+
+
+@contextmanager
+def results_folder(
+    name: str, arguments: Mapping[str, Any], folder: Path | str | None, overwrite: bool,
+    results: Path | None,
+) -> Iterator[Folder | None]:  # fmt: skip
+    """The open results folder of a verb; None if nothing is kept.
+
+    Args:
+        name: Path of a folder beside `results`, if none is given, such as plans/ROBOT.
+        arguments: All that the results depend on, for JSON.
+        folder: The folder; None: a free one of the name.
+        overwrite: As of `Folder`.
+        results: As of `Follow`.
+    """
+    if folder is None and results is None:
+        yield None
+        return
+    path = folder or free_folder((results or Path()).parent / name, arguments)
+    with Folder(Path(path), arguments, overwrite) as opened:
+        yield opened
 
 
 def is_locked(folder: Path) -> bool:

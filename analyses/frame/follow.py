@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cdpr_drake.errors import StoppedError
+
 
 @dataclass(frozen=True)
 class Progress:
@@ -50,6 +52,16 @@ class Follow:
     stop: Callable[[], bool] = lambda: False
     say: Callable[[str], None] = lambda words: None
     results: Path | None = None
+
+    def doing(self, words: str) -> None:
+        """Tells what is done now, of work of which nobody knows how long it takes.
+
+        Raises:
+            StoppedError: It should stop.
+        """
+        if self.stop():
+            raise StoppedError("stopped; nothing was kept")
+        self.progress(Progress(words, 0.0, 1.0))
 
 
 NOBODY = Follow()

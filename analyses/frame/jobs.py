@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
 from cdpr_drake.blas_threads import one_blas_thread, started_with_one_thread
@@ -49,6 +49,7 @@ def finished_jobs(
     stop: Callable[[], bool] = lambda: False,
     say: Callable[[str], None] = lambda words: None,
     name: str = "job",
+    standing: Processes | None = None,
 ) -> Iterator[FinishedJob[Result]]:
     """Does jobs in any order and gives each as it ends.
 
@@ -60,6 +61,7 @@ def finished_jobs(
         stop: Asked often; after True no further job begins, and those under way are still given.
         say: Gets words on what a cluster lacks.
         name: Of the jobs, for the dashboard of a cluster.
+        standing: Keeps the processes of this machine for the next call with the same `work`.
 
     Raises:
         SweepError: The number of workers is not accepted, or the cluster cannot be used.
@@ -87,7 +89,7 @@ def finished_jobs(
         if count > 1 and passed * len(waiting) > WORTH_PROCESSES:
             break
     if waiting:
-        yield from _in_processes(with_inputs(work), jobs, waiting, count, stop)
+        yield from _in_processes(with_inputs(work), jobs, waiting, count, stop, standing)
 
 
 def with_inputs(work: Callable[[Job], Result]) -> Callable[[Job], Result]:
@@ -98,9 +100,10 @@ def with_inputs(work: Callable[[Job], Result]) -> Callable[[Job], Result]:
 
 def _in_processes(
     work: Callable[[Job], Result], jobs: Sequence[Job], waiting: deque[int], count: int,
-    stop: Callable[[], bool],
+    stop: Callable[[], bool], standing: Processes | None,
 ) -> Iterator[FinishedJob[Result]]:  # fmt: skip
-    idle = [_Process(work) for _ in range(min(count, len(waiting)))]
+    idle = [] if standing is None else standing.idle
+    idle += [_Process(work) for _ in range(min(count, len(waiting)) - len(idle))]
     busy: dict[Connection[Any, Any], _Process] = {}
     try:
         while waiting or busy:
@@ -120,8 +123,25 @@ def _in_processes(
                 idle.append(process)
                 yield finished
     finally:
-        for process in [*idle, *busy.values()]:
+        for process in [*(idle if standing is None else ()), *busy.values()]:
             process.end(at_once=process.connection in busy)
+
+
+class Processes:
+    """Processes that stay from one call of `finished_jobs` to the next, inside a `with` block."""
+
+    def __init__(self) -> None:
+        """Of no process yet."""
+        self.idle: list[_Process] = []
+
+    def __enter__(self) -> Self:
+        """The block begins."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Ends them."""
+        for process in self.idle:
+            process.end()
 
 
 class _Process:

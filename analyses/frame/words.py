@@ -305,3 +305,39 @@ OpenedWord: TypeAlias = Annotated[
           completer=lambda context: _files("robot")(context) + _files("scenario")(context)),
 ]  # fmt: skip
 """What the studio opens."""
+class Word(str):
+    """A word of a command line with its value, for results that tell what was asked.
+
+    Attributes:
+        value: What it means.
+    """
+
+    value: Any
+
+
+def with_word(parse: Callable[[str], Any]) -> Callable[[str], Word]:
+    """Makes a `Word` of a word that `parse` accepts."""
+
+    def keep(word: str) -> Word:
+        result = Word(word)
+        result.value = parse(word)
+        return result
+
+    return keep
+
+
+def value_of(given: Any) -> Any:
+    """The value of a `Word`; of anything else, itself."""
+    return given.value if isinstance(given, Word) else given
+
+
+def poses(word: str) -> list[Any]:
+    """Poses X_WP with ; between them."""
+    return [pose(part) for part in word.split(";") if part.strip()]
+
+
+Switch: TypeAlias = Annotated[bool, Parameter(negative=())]
+"""An option without a value, which is off by default."""
+
+InputFile: TypeAlias = Annotated[Any, words(Path, "the path of a file", "FILE")]
+"""A file; in Python what it holds, too."""

@@ -26,8 +26,8 @@ from cdpr_drake.analyses.calibration.log_fit import ROBOT
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.calibration import proposed_poses
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
-from cdpr_drake.analyses.front.planning import path_poses
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS

@@ -1,7 +1,7 @@
 from .cable_streams import cable_stream as cable_stream
-from .plan_figures import phase_figure as phase_figure
-from .plan_results import PlanRun as PlanRun
+from .path_plan import PathMotion as PathMotion
 from .plan_tracking import track_plan as track_plan
+from .plans import Plan as Plan
 from .rest_to_rest import plan_rest_to_rest as plan_rest_to_rest
 from .robot_path_task import LimitSettings as LimitSettings
 from .robot_path_task import make_path as make_path

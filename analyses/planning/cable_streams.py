@@ -8,16 +8,18 @@ asks the cables' tensions between points, where a stream that is too coarse lets
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.plan_results import MOMENT, MotionRun
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.planning.plan_tracking import MOMENT
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
-from cdpr_drake.analyses.reporting.log_files import finite, write_json
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.cables.models import (
@@ -33,8 +35,12 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.planning.path_task import sample_motion
+from cdpr_drake.planning.path_task import PathTask, sample_motion
 from cdpr_drake.trajectories.sampled_motion import TIME_COLUMN
+from cdpr_drake.trajectories.timed_path import TimedPath
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MODELS = (ELASTIC, CATENARY)
 """Cable models whose tension follows from their length."""
@@ -82,8 +88,8 @@ class StreamCheck:
         return not np.any(self.slack)
 
 
-@dataclass(frozen=True, eq=False)
-class CableStream:
+@dataclass(frozen=True, eq=False, repr=False)
+class CableStream(Result):
     """A motion as drives follow it.
 
     Attributes:
@@ -111,54 +117,112 @@ class CableStream:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         names = [cable.name for cable in self.robot.cables]
-        told = self.check
-        found: dict[str, Any] = finite(
+        check = self.check
+        result: dict[str, Any] = finite(
             {
                 "model": self.model,
                 "rate_hz": self.rate,
                 "points": len(self.times),
                 "zero_lengths_m": dict(zip(names, self.zero_lengths.tolist(), strict=True)),
                 "largest_stretch_mm": 1e3 * float(np.max(self.stretch)),
-                "instants_checked": told.instants,
-                "least_tension_n": dict(zip(names, told.least.tolist(), strict=True)),
-                "least_tension_at_s": dict(zip(names, told.least_at.tolist(), strict=True)),
-                "largest_tension_n": dict(zip(names, told.largest.tolist(), strict=True)),
-                "slack_instants": dict(zip(names, told.slack.tolist(), strict=True)),
-                "keeps_taut": told.keeps_taut,
+                "instants_checked": check.instants,
+                "least_tension_n": dict(zip(names, check.least.tolist(), strict=True)),
+                "least_tension_at_s": dict(zip(names, check.least_at.tolist(), strict=True)),
+                "largest_tension_n": dict(zip(names, check.largest.tolist(), strict=True)),
+                "slack_instants": dict(zip(names, check.slack.tolist(), strict=True)),
+                "keeps_taut": check.keeps_taut,
             }
         )
-        return found
+        return result
 
-    def words(self) -> str:
-        """In one line."""
+    @property
+    def verdict(self) -> str:
+        """Whether it keeps cables taut, in words."""
+        return "no cable goes slack" if self.check.keeps_taut else "CABLES GO SLACK"
+
+    def tables(self) -> list[Table]:
+        """Tensions of drives that follow it."""
+        check = self.check
+        rows = [
+            (cable.name, f"{check.least[k]:.4g}", f"{check.least_at[k]:.4g}",
+             f"{check.largest[k]:.4g}", str(check.slack[k]))
+            for k, cable in enumerate(self.robot.cables)
+        ]  # fmt: skip
+        headings = ("cable", "least [N]", "at [s]", "largest [N]", "slack instants")
+        return [Table(f"{self.robot.name}: tensions of the stream", headings, rows)]
+
+    def lines(self) -> list[str]:
+        """Its points, and whether it keeps cables taut."""
         k = int(np.argmin(self.check.least))
-        name, least = self.robot.cables[k].name, self.check.least[k]
-        verdict = "no cable goes slack" if self.check.keeps_taut else "CABLES GO SLACK"
-        return (
-            f"stream of {len(self.times)} points at {self.rate:g} Hz, {self.model}: {verdict} at "
-            f"points or between them; least tension {least:.4g} N in {name} at "
-            f"{self.check.least_at[k]:.4g} s"
-        )
+        return [
+            f"stream of {len(self.times)} points at {self.rate:g} Hz, {self.model}: {self.verdict} "
+            f"at points or between them; least tension {self.check.least[k]:.4g} N in "
+            f"{self.robot.cables[k].name} at {self.check.least_at[k]:.4g} s"
+        ]
 
-    def write(self, folder: Path) -> dict[str, Any]:
-        """Writes lengths, motor angles and what was checked into a folder; returns the last."""
-        told = self.as_dict()
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """Lengths and motor angles over time, and by how much lengths are below straight ways."""
+        return {"stream": self._draw}
+
+    def _draw(self) -> Figure:
+        from cdpr_drake.analyses.visualization.cable_figures import draw_cables
+        from cdpr_drake.analyses.visualization.figure_style import bare_figure, styled
+
+        title = (
+            f"{self.robot.name}: stream of {len(self.times)} points at {self.rate:g} Hz, "
+            f"{self.model} cables\n{self.verdict}; angles are zero at the home pose at rest"
+        )
+        below = "stretch less sag" if CABLE_MODELS[self.model].sags else "stretch"
+        shown: list[tuple[str, Any]] = [
+            ("unstrained length [m]", self.lengths),
+            ("motor angle [turns],\npositive pays out", self.motor_angles / (2.0 * np.pi)),
+            (f"{below} [mm]", 1e3 * self.stretch),
+        ]
+        figure = bare_figure((11.0, 9.0), title)
+        with styled():
+            panels = figure.subplots(len(shown), 1, sharex=True)
+            for panel, (label, values) in zip(panels, shown, strict=True):
+                draw_cables(panel, self.robot, self.times, values)
+                panel.set(ylabel=label)
+                panel.margins(x=0.01)
+            panels[0].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+            panels[-1].set(xlabel="time [s]")
+        return figure
+
+    def write(self, folder: Folder) -> None:
+        """Writes lengths, motor angles and what was checked."""
         names = [cable.name for cable in self.robot.cables]
         for file, values, unit in (
             (LENGTHS, self.lengths, "unstrained_length_m"),
             (ANGLES, self.motor_angles, "motor_angle_rad"),
         ):
             columns = {f"{name}_{unit}": values[:, k] for k, name in enumerate(names)}
-            write_columns(folder / file, {TIME_COLUMN: self.times, **columns})
-        write_json(folder / CHECK, told)
-        return told
+            with folder.file(file) as part:
+                write_columns(part, {TIME_COLUMN: self.times, **columns})
+        folder.write_json(CHECK, self.as_dict())
 
 
-def cable_stream(run: MotionRun, rate: float, model: str | None = None) -> CableStream:
+class Planned(Protocol):
+    """A motion of a robot with its cables, such as a `Plan`."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+
+    @property
+    def task(self) -> PathTask:
+        """The robot as it was planned with."""
+
+    @property
+    def motion(self) -> TimedPath:
+        """The motion."""
+
+
+def cable_stream(plan: Planned, rate: float, model: str | None = None) -> CableStream:
     """A planned motion as unstrained lengths and motor angles, and whether cables stay taut.
 
     Args:
-        run: The plan.
+        plan: The plan.
         rate: Points a second [Hz].
         model: A name of `MODELS`. Default: catenary if the robot file's cables sag, else elastic.
 
@@ -166,7 +230,7 @@ def cable_stream(run: MotionRun, rate: float, model: str | None = None) -> Cable
         PlanningError: The rate or the model is not accepted, the plan's tensions are none that a
             cable can have, or winches hold several cables.
     """
-    robot = run.robot
+    robot = plan.robot
     if model is None:
         sags = robot.cable_model is not None and CABLE_MODELS[robot.cable_model].sags
         model = CATENARY if sags else ELASTIC
@@ -176,17 +240,17 @@ def cable_stream(run: MotionRun, rate: float, model: str | None = None) -> Cable
         raise PlanningError(
             f"stream: rate: found {rate:g} Hz; accepted: {RATES[0]:g} to {RATES[1]:g} Hz"
         )
-    end = run.motion.end_time
+    end = plan.motion.end_time
     if end * rate > MOST_POINTS:
         raise PlanningError(
             f"stream: found {end * rate:.0f} points; accepted: at most {MOST_POINTS}"
         )
-    cables = run.task.cables
+    cables = plan.task.cables
     times = np.arange(int(end * rate + MOMENT) + 1) / rate
     if end > times[-1] + MOMENT:
         times = np.append(times, end)
-    samples = sample_motion(run.task, run.motion, times)
-    poses = [_pose(run, t) for t in times]
+    samples = sample_motion(plan.task, plan.motion, times)
+    poses = [_pose(plan, t) for t in times]
     lengths = np.array(
         [
             _unstrained(cables, model, X, t, when)
@@ -198,12 +262,12 @@ def cable_stream(run: MotionRun, rate: float, model: str | None = None) -> Cable
     drum = robot.drum()
     return CableStream(
         robot, model, rate, times, lengths, np.asarray(drum.motor_angles(lengths - zero)), zero,
-        straight - lengths, _checked(run, cables, model, times, lengths),
+        straight - lengths, _checked(plan, cables, model, times, lengths),
     )  # fmt: skip
 
 
-def _pose(run: MotionRun, time: float) -> RigidTransform:
-    return pose_from_row(np.asarray(run.motion.motion(float(time)))[:_POSE])
+def _pose(plan: Planned, time: float) -> RigidTransform:
+    return pose_from_row(np.asarray(plan.motion.motion(float(time)))[:_POSE])
 
 
 def _zero_lengths(robot: Robot, cables: CableSet, model: str, first: Array) -> Array:
@@ -235,17 +299,18 @@ def _unstrained(cables: CableSet, model: str, X: RigidTransform, t: Array, when:
 
 
 def _checked(
-    run: MotionRun, cables: CableSet, model: str, times: Array, lengths: Array
+    plan: Planned, cables: CableSet, model: str, times: Array, lengths: Array
 ) -> StreamCheck:
     share = np.arange(BETWEEN + 1) / (BETWEEN + 1)
-    asked = (times[:-1, None] + share * np.diff(times)[:, None]).ravel()
-    asked = np.append(asked, times[-1])
-    between = np.column_stack([np.interp(asked, times, column) for column in lengths.T])
+    instants = (times[:-1, None] + share * np.diff(times)[:, None]).ravel()
+    instants = np.append(instants, times[-1])
+    between = np.column_stack([np.interp(instants, times, column) for column in lengths.T])
     states = [
-        cable_state(cables, model, _pose(run, t), l0) for t, l0 in zip(asked, between, strict=True)
+        cable_state(cables, model, _pose(plan, t), l0)
+        for t, l0 in zip(instants, between, strict=True)
     ]
     tensions = np.array([state.tensions for state in states])
     return StreamCheck(
-        tensions.min(axis=0), asked[np.argmin(tensions, axis=0)], tensions.max(axis=0),
-        np.sum([state.slack for state in states], axis=0), len(asked),
+        tensions.min(axis=0), instants[np.argmin(tensions, axis=0)], tensions.max(axis=0),
+        np.sum([state.slack for state in states], axis=0), len(instants),
     )  # fmt: skip

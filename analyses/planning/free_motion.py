@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.free_detours import detours, is_free
 from cdpr_drake.analyses.planning.robot_path_task import length_scale
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, TensionProblemError, accepted_names
@@ -59,6 +58,21 @@ keeps the ends by itself."""
 
 GUESSES = (1.3, 2.5, 5.0)
 """Times from which a solver starts, over the least along the straight line, until it succeeds."""
+
+LOOKS = 80
+"""Poses of a way that are looked at."""
+
+DIRECTIONS = 8
+"""Directions across the straight line into which ways lead."""
+
+STEPS = 24
+"""Distances from the straight line that are tried in a direction, up to its length."""
+
+SHARES = (0.0, 0.2, 0.5)
+"""Of the straight line: where a way leaves it and, from the other end, comes back to it."""
+
+MOST_DETOURS = 4
+"""Ways that are given, each in a direction of its own."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,14 +171,14 @@ def camera_view(robot: Robot, name: str | None) -> View:
         raise PlanningError(
             f"camera: found {name!r}; accepted for {robot.name}: {', '.join(names) or 'none'}"
         )
-    mount = mounts[0] if name is None else next(one for one in mounts if one.name == name)
+    mount = mounts[0] if name is None else next(mount for mount in mounts if mount.name == name)
     return View(mount.pose.transform(), load_camera(mount.model).view_slopes())
 
 
 def solve_free_motion(
     robot: Robot,
     task: PathTask,
-    asked: FreeSettings,
+    settings: FreeSettings,
     say: Callable[[str], None] = lambda words: None,
 ) -> FreePathSolution:
     """Plans a motion from rest to rest whose path is free.
@@ -179,31 +193,31 @@ def solve_free_motion(
     Args:
         robot: The robot.
         task: The robot and its limits.
-        asked: What is asked.
+        settings: What is asked.
         say: Told what is done now.
 
     Raises:
         PlanningError: A number is not accepted, the platform cannot rest at an end, or no motion
             was found; says where, and which cable.
     """
-    for where, X_WP in (("from", asked.start), ("to", asked.goal)):
+    for where, X_WP in (("from", settings.start), ("to", settings.goal)):
         try:
             check_pose(robot, X_WP)
         except TensionProblemError as problem:
             raise PlanningError(f"{where}: {problem}") from problem
         check_held(task, X_WP, where)
-    if max(pose_error(asked.start, asked.goal)) < 1e-9:
+    if max(pose_error(settings.start, settings.goal)) < 1e-9:
         raise PlanningError("to: found the pose of the start; accepted: another one")
-    guesses = _guesses(robot, task, asked)
+    guesses = _guesses(robot, task, settings)
     solution = None
     for number, (path, time) in enumerate(guesses, 1):
         say(f"Planning for {robot.name}: start {number} of {len(guesses)}")
-        bounds = (SHORTEST, LONGEST) if asked.duration is None else (asked.duration,) * 2
-        program = _program(robot, task, asked, bounds)
-        found = program.Solve(float(np.clip(time, SHORTEST, LONGEST)), path)
-        if solution is None or solution.trajectory is None or found.success:
-            solution = found
-        if found.success:
+        bounds = (SHORTEST, LONGEST) if settings.duration is None else (settings.duration,) * 2
+        program = _program(robot, task, settings, bounds)
+        candidate = program.Solve(float(np.clip(time, SHORTEST, LONGEST)), path)
+        if solution is None or solution.trajectory is None or candidate.success:
+            solution = candidate
+        if candidate.success:
             break
     assert solution is not None
     solution.motion()  # raises where there is none
@@ -211,52 +225,52 @@ def solve_free_motion(
 
 
 def _guesses(
-    robot: Robot, task: PathTask, asked: FreeSettings
+    robot: Robot, task: PathTask, settings: FreeSettings
 ) -> list[tuple[PosePath | TimedPath | None, float]]:
     """Where the solver starts, one after the other: a path, None the straight line, and a time.
 
     Raises:
         PlanningError: The platform or a cable is in an obstacle at an end.
     """
-    shares = GUESSES if asked.duration is None else (1.0,)
+    shares = GUESSES if settings.duration is None else (1.0,)
     scale = length_scale(robot)
-    straight = straight_path([asked.start, asked.goal], scale)
+    straight = straight_path([settings.start, settings.goal], scale)
 
     def timed(path: PosePath | None, share: float) -> float:
-        if asked.duration is not None:
-            return asked.duration
+        if settings.duration is not None:
+            return settings.duration
         return share * _time_along(task, path or straight)
 
-    guess = asked.guess
+    guess = settings.guess
     if isinstance(guess, TimedPath):  # which the solver starts from in its own time
-        _check_guess(asked, guess.pose(guess.start_time), guess.pose(guess.end_time))
+        _check_guess(settings, guess.pose(guess.start_time), guess.pose(guess.end_time))
         return [(guess, guess.end_time - guess.start_time)]
     if guess is not None:
-        _check_guess(asked, guess.pose(0.0), guess.pose(guess.length))
+        _check_guess(settings, guess.pose(0.0), guess.pose(guess.length))
         return [(guess, timed(guess, share)) for share in shares]
     lines: list[tuple[PosePath | TimedPath | None, float]]
-    if asked.clearance is None or asked.obstacles is None:
+    if settings.clearance is None or settings.obstacles is None:
         least = timed(None, 1.0)
         return [(None, share * least) for share in shares]
-    places = place_constraints(robot, task, asked, BodyState())
-    for where, X_WP in (("from", asked.start), ("to", asked.goal)):
+    places = place_constraints(robot, task, settings, BodyState())
+    for where, X_WP in (("from", settings.start), ("to", settings.goal)):
         _check_ends(places, X_WP, where)
     held = [*places, TensionFeasible(task, BodyState())]
     lines = [(None, timed(None, share)) for share in shares]
     if is_free(held, straight):
         return lines
     moves = [row - 3 for row in task.dynamics.motions if row >= 3]
-    found = detours(held, asked.start, asked.goal, scale, moves)
-    return [*((path, timed(path, shares[0])) for path in found), *lines[:1]]
+    ways = detours(held, settings.start, settings.goal, scale, moves)
+    return [*((path, timed(path, shares[0])) for path in ways), *lines[:1]]
 
 
-def _check_guess(asked: FreeSettings, first: RigidTransform, last: RigidTransform) -> None:
+def _check_guess(settings: FreeSettings, first: RigidTransform, last: RigidTransform) -> None:
     """Refuses a guess between other poses.
 
     Raises:
         PlanningError: It is; says by how much.
     """
-    for word, at, end in (("begins", first, asked.start), ("ends", last, asked.goal)):
+    for word, at, end in (("begins", first, settings.start), ("ends", last, settings.goal)):
         way, angle = pose_error(at, end)
         if max(way, angle) > GUESS_WITHIN:
             raise PlanningError(
@@ -284,47 +298,49 @@ def _check_ends(places: list[PoseConstraint], X_WP: RigidTransform, where: str) 
 
 
 def place_constraints(
-    robot: Robot, task: PathTask, asked: FreeSettings, coordinates: Coordinates
+    robot: Robot, task: PathTask, settings: FreeSettings, coordinates: Coordinates
 ) -> list[PoseConstraint]:
     """What is asked of poses alone: the frame, cables apart, obstacles, the view."""
     cables, names = task.cables, [task.name(i) for i in range(task.cables.count)]
-    found: list[PoseConstraint] = []
+    constraints: list[PoseConstraint] = []
     if not robot.frame.assumed:
-        found.append(PlaceWithin(coordinates, *robot.frame.bounds()))
-    if asked.clearance is not None:
+        constraints.append(PlaceWithin(coordinates, *robot.frame.bounds()))
+    if settings.clearance is not None:
         radius = 0.5 * float(np.max(robot.diameters()))
-        apart = asked.clearance + 2.0 * radius
-        found.append(CableClearance(cables, coordinates, apart, names))
-        shapes = asked.solids().shapes()
+        apart = settings.clearance + 2.0 * radius
+        constraints.append(CableClearance(cables, coordinates, apart, names))
+        shapes = settings.solids().shapes()
         if shapes:
             bodies = [ConvexShape.box(box_row(robot.box_center(), robot.platform.size))]
-            lines = asked.clearance + radius
-            found.append(
+            lines = settings.clearance + radius
+            constraints.append(
                 ObstacleClearance(
-                    cables, coordinates, shapes, bodies, lines, asked.clearance, names=names
+                    cables, coordinates, shapes, bodies, lines, settings.clearance, names=names
                 )
             )
-    if asked.in_view is not None:
-        view = camera_view(robot, asked.camera)
-        found.append(
-            TargetInView(coordinates, view.X_PC, view.slopes, asked.in_view, asked.nearest)
+    if settings.in_view is not None:
+        view = camera_view(robot, settings.camera)
+        constraints.append(
+            TargetInView(coordinates, view.X_PC, view.slopes, settings.in_view, settings.nearest)
         )
-    return found
+    return constraints
 
 
 def _program(
-    robot: Robot, task: PathTask, asked: FreeSettings, bounds: tuple[float, ...]
+    robot: Robot, task: PathTask, settings: FreeSettings, bounds: tuple[float, ...]
 ) -> FreePathProgram:
-    program = FreePathProgram(task, asked.start, asked.goal, asked.knots, (bounds[0], bounds[1]))
+    program = FreePathProgram(
+        task, settings.start, settings.goal, settings.knots, (bounds[0], bounds[1])
+    )
     program.AddCableSpeedLimits()
     program.AddWinchLimits()
-    if asked.least == "time":
+    if settings.least == "time":
         program.AddLeastTime()
-    elif asked.least == "tension":
+    elif settings.least == "tension":
         program.AddTensionCost()
     else:
         program.AddEnergyCost()
-    for constraint in place_constraints(robot, task, asked, program.pose_coordinates):
+    for constraint in place_constraints(robot, task, settings, program.pose_coordinates):
         program.Add(constraint)
     return program
 
@@ -335,3 +351,73 @@ def _time_along(task: PathTask, path: PosePath) -> float:
         return plan_along_path(task, path).duration
     except PlanningError:
         return path.length / GUESSED_SPEED
+
+
+def is_free(constraints: Sequence[PoseConstraint], path: PosePath) -> bool:
+    """Whether a path keeps constraints of `BodyState` at every pose that is looked at."""
+    rows = path.points(np.linspace(0.0, path.length, LOOKS))[:, :7]
+    return all(not np.any(each.missed(each.evaluate(rows)[0]) > 0.0) for each in constraints)
+
+
+def detours(
+    constraints: Sequence[PoseConstraint],
+    start: RigidTransform,
+    goal: RigidTransform,
+    length_scale: float,
+    moves: Sequence[int] = (0, 1, 2),
+) -> list[PosePath]:
+    """Ways of three or four straight lines that keep constraints, the shortest first.
+
+    They leave the straight line across, go along it, and come back; of each direction the shortest
+    is kept.
+
+    Args:
+        constraints: Of `BodyState`, of poses alone or at rest.
+        start: X_WP at the start [m].
+        goal: X_WP at the goal [m].
+        length_scale: By which turns count as lengths [m].
+        moves: Axes of W along which the platform can move.
+    """
+    way = goal.translation() - start.translation()
+    length = float(np.linalg.norm(way))
+    best: list[PosePath] = []
+    for across in _across(way, moves):
+        ways: list[PosePath] = []
+        for share in SHARES:
+            for step in range(1, STEPS + 1):
+                off = across * (length * step / STEPS)
+                corners = [start]
+                first = RigidTransform(start.rotation(), start.translation() + share * way + off)
+                last = RigidTransform(goal.rotation(), goal.translation() - share * way + off)
+                corners += [first] if share == 0.5 else [first, last]
+                path = straight_path([*corners, goal], length_scale)
+                if is_free(constraints, path):
+                    ways.append(path)
+                    break
+        if ways:
+            best.append(min(ways, key=lambda path: path.length))
+    return sorted(best, key=lambda path: path.length)[:MOST_DETOURS]
+
+
+def _across(way: Array, moves: Sequence[int]) -> list[Array]:
+    """Unit vectors across a way, of those along which the platform can move."""
+    free = np.zeros((3, 3))
+    free[list(moves), list(moves)] = 1.0
+    length = float(np.linalg.norm(way))
+    if length > 0.0:
+        free -= np.outer(way, way) / length**2
+    values, vectors = np.linalg.eigh(free @ free.T)
+    plane = vectors[:, values > 0.5]
+    if plane.shape[1] == 0:
+        return []
+    if plane.shape[1] == 1:
+        return [plane[:, 0], -plane[:, 0]]
+    # Upwards first: the second axis of the plane is as vertical as it can be.
+    up = plane @ (plane.T @ np.array([0.0, 0.0, 1.0]))
+    if np.linalg.norm(up) < 1e-9:
+        up = plane[:, 0]
+    up = up / np.linalg.norm(up)
+    side = plane @ (plane.T @ np.cross(way if length > 0.0 else [1.0, 0.0, 0.0], up))
+    side = side / np.linalg.norm(side)
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    return [np.cos(angle) * up + np.sin(angle) * side for angle in angles]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,8 +11,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.planning.g_code import parse_g_code
-from cdpr_drake.errors import DataFileError
+from cdpr_drake.errors import DataFileError, PlanningError
 from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.trajectories.curved_path import STRAIGHT, Move
 
 COLUMNS = ("x", "y", "z", "phi", "theta", "psi")
@@ -23,21 +25,43 @@ G_CODE = (".gcode", ".nc", ".ngc", ".tap")
 
 
 @dataclass(frozen=True)
-class PathFile:
-    """What a file of a path says.
+class PathPoses:
+    """Poses of a path.
 
     Attributes:
         poses: X_WP, one after the other [m].
-        remarks: What was left out, a line each.
-        moves: How it goes from each pose to the next; none: nothing is said of that.
+        source: What the path is, in words.
+        remarks: What was left out of a file, a line each.
+        moves: How it goes from each pose to the next: lines, arcs, feeds; none: not said.
     """
 
     poses: list[RigidTransform]
+    source: str
     remarks: tuple[str, ...] = ()
     moves: tuple[Move, ...] = ()
 
 
-def read_path(path: Path, height: float | None = None) -> PathFile:
+def path_poses(robot: Robot, path: Path | str | Sequence[object]) -> PathPoses:
+    """Poses of a path of a robot.
+
+    Args:
+        robot: The robot.
+        path: A file, .csv of x,y,z[,phi,theta,psi] [m, deg] or G-code; or at least two poses, each
+            as `as_pose` takes it [m].
+
+    Raises:
+        DataFileError: The file cannot be read, or a line is not accepted.
+        PlanningError: There are fewer than two poses.
+    """
+    if isinstance(path, str | Path):
+        return read_path(Path(path), robot.plane_height)
+    poses = [as_pose(robot, pose) for pose in path]
+    if len(poses) < 2:
+        raise PlanningError(f"path: found {len(poses)} poses; accepted: at least 2")
+    return PathPoses(poses, f"{len(poses)} waypoints")
+
+
+def read_path(path: Path, height: float | None = None) -> PathPoses:
     """Reads poses from a table (.csv) or from G-code (see `g_code`).
 
     Args:
@@ -58,13 +82,13 @@ def read_path(path: Path, height: float | None = None) -> PathFile:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as problem:
         raise DataFileError(f"{path}: cannot be read as text: {problem}") from problem
-    found = _read_table(path, lines) if ending == ".csv" else _read_g_code(path, lines, height)
-    if len(found.poses) < 2:
-        raise DataFileError(f"{path}: found {len(found.poses)} poses; accepted: at least 2")
-    return found
+    read = _read_table(path, lines) if ending == ".csv" else _read_g_code(path, lines, height)
+    if len(read.poses) < 2:
+        raise DataFileError(f"{path}: found {len(read.poses)} poses; accepted: at least 2")
+    return read
 
 
-def _read_table(path: Path, lines: list[str]) -> PathFile:
+def _read_table(path: Path, lines: list[str]) -> PathPoses:
     """Rows of `COLUMNS`, or of the first three; a head with these names may stand above them."""
     poses: list[RigidTransform] = []
     size = 0
@@ -89,7 +113,7 @@ def _read_table(path: Path, lines: list[str]) -> PathFile:
             )
         size = len(values)
         poses.append(_pose(values))
-    return PathFile(poses)
+    return PathPoses(poses, path.name)
 
 
 def _rows(path: Path, lines: list[str]) -> Iterator[tuple[int, list[str]]]:
@@ -115,8 +139,8 @@ def _pose(values: list[float]) -> RigidTransform:
     return pose_from_angles(np.array(values[:3]), angles)
 
 
-def _read_g_code(path: Path, lines: list[str], height: float | None) -> PathFile:
-    found = parse_g_code(path, lines, height)
-    plain = all(move.arc is None and move.speed == STRAIGHT.speed for move in found.moves)
-    moves = () if plain else tuple(found.moves)
-    return PathFile([_pose(place) for place in found.places], found.remarks, moves)
+def _read_g_code(path: Path, lines: list[str], height: float | None) -> PathPoses:
+    code = parse_g_code(path, lines, height)
+    plain = all(move.arc is None and move.speed == STRAIGHT.speed for move in code.moves)
+    moves = () if plain else tuple(code.moves)
+    return PathPoses([_pose(place) for place in code.places], path.name, code.remarks, moves)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.geometry.poses import pose_rows_distance
@@ -15,7 +16,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_timing import PathPlan
-from cdpr_drake.summaries import Summarized
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
     build_tension_control,
@@ -25,6 +25,9 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 
 RATE = 1000.0
 """Steps of control and rows of the log per second [Hz]."""
+
+MOMENT = 1e-9
+"""Instants that are nearer are one [s]."""
 
 GAINS = TaskGains(stiffness=100.0, damping=20.0)
 """Of the computed torque, as of the scenarios that come with the package."""
@@ -40,7 +43,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrackedPlan(Summarized):
+class TrackedPlan(Result):
     """What the simulated robot did.
 
     Attributes:
@@ -57,15 +60,19 @@ class TrackedPlan(Summarized):
     cable_accelerations: Array
     torques: Array
 
-    def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """As `Summarized` has it."""
+    def tables(self) -> list[Table]:
+        """Shares of limits."""
+        rows = [(name, f"{share:.4f}") for name, share in self.uses().items()]
+        headings = ("limit of the robot", "largest share used")
+        return [Table("The simulated robot tracks it", headings, rows)]
+
+    def lines(self) -> list[str]:
+        """Whether limits were kept, and how exactly."""
         distance, angle = self.errors()
-        kept = "all kept" if self.keeps_limits() else "MISSED; plan with more reserve"
-        shares = ", ".join(f"{name} {share:.4f}" for name, share in self.uses().items())
-        return "The simulated robot tracks the plan", [
-            ("limits", f"{kept}; steps without tensions: {self.missed_steps()}"),
-            ("largest shares", shares),
-            ("error", f"up to {1e3 * distance:.3f} mm, {np.degrees(angle):.4f} deg"),
+        verdict = "all limits kept" if self.keeps_limits() else "LIMITS MISSED; more reserve"
+        return [
+            f"{verdict}; steps without tensions: {self.missed_steps()}; error up to "
+            f"{1e3 * distance:.3f} mm, {np.degrees(angle):.4f} deg"
         ]
 
     def missed_steps(self) -> int:
@@ -76,19 +83,19 @@ class TrackedPlan(Summarized):
         """Largest share of each limit that was used, by its name; above 1: it was missed."""
         t, lim = self.log["tensions"][1:], self.limits
         middle, half = 0.5 * (lim.upper + lim.lower), 0.5 * (lim.upper - lim.lower)
-        found = {
+        shares = {
             "tension": float(np.max(np.abs(t - middle)) / half),
             "cable speed": float(np.max(np.abs(self.cable_speeds)) / lim.cable_speed),
         }
         if np.isfinite(lim.cable_acceleration):
             most = float(np.max(np.abs(self.cable_accelerations)))
-            found["cable acceleration"] = most / lim.cable_acceleration
+            shares["cable acceleration"] = most / lim.cable_acceleration
         if np.isfinite(lim.torque):
-            found["torque"] = float(np.max(np.abs(self.torques)) / lim.torque)
+            shares["torque"] = float(np.max(np.abs(self.torques)) / lim.torque)
         if np.isfinite(lim.speed):
             steps = np.linalg.norm(np.diff(self.log["X_WP"][:, 4:], axis=0), axis=1)
-            found["speed of Po"] = float(np.max(steps)) * RATE / lim.speed
-        return found
+            shares["speed of Po"] = float(np.max(steps)) * RATE / lim.speed
+        return shares
 
     def keeps_limits(self) -> bool:
         """Whether no limit was missed, and tensions were found at every step."""

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.errors import (
     PlanningError,
     RobotFileError,
     TensionProblemError,
+    WrenchSetError,
     accepted_names,
 )
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_schema import Robot
@@ -55,9 +60,7 @@ class LimitSettings:
         cable_acceleration: Largest acceleration of a cable [m/s^2].
         speed: Largest speed of Po [m/s].
         reserve: Share of all limits that is left to feedback, see `MotionLimits.within`. None:
-            `RESERVE` in plans, such as those of `plan_path`; nothing in a task for constraints of
-            one's own, `path_task`.
-        feeds: Whether feeds of a file of G-code are kept, as largest speeds of Po.
+            nothing.
     """
 
     tensions: tuple[float, float] | None = None
@@ -65,10 +68,20 @@ class LimitSettings:
     cable_acceleration: float | None = None
     speed: float | None = None
     reserve: float | None = None
-    feeds: bool = True
+
+    def as_dict(self, pulleys: bool) -> dict[str, Any]:
+        """For JSON, with the geometry of the cables that is planned with."""
+        return {
+            "limits_n": self.tensions,
+            "cable_speed_m_s": self.cable_speed,
+            "cable_acceleration_m_s2": self.cable_acceleration,
+            "speed_m_s": self.speed,
+            "reserve": self.reserve,
+            "pulleys": pulleys,
+        }
 
 
-def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
+def robot_limits(robot: Robot, settings: LimitSettings) -> MotionLimits:
     """The limits of a robot, without reserve.
 
     Of the rated torque friction takes its largest part first: the static one, and the viscous one
@@ -77,7 +90,7 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
     Raises:
         PlanningError: A limit is not accepted.
     """
-    lower, upper = robot.tension_limits(given.tensions)
+    lower, upper = robot.tension_limits(settings.tensions)
     winch = robot.winch
     radii = robot.drum().radii(len(robot.cables))
     if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
@@ -86,7 +99,12 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
             "on their drums; accepted for a plan: a winch for each cable, all alike"
         )
     ratio = float(radii[0])
-    cable_speed = winch.rated_cable_speed() if given.cable_speed is None else given.cable_speed
+    cable_speed = settings.cable_speed
+    if cable_speed is None:
+        cable_speed = winch.rated_cable_speed()
+    acceleration, speed = (
+        np.inf if most is None else most for most in (settings.cable_acceleration, settings.speed)
+    )
     torque = np.inf
     if winch.motor_torque is not None:
         torque = winch.motor_torque
@@ -99,23 +117,21 @@ def robot_limits(robot: Robot, given: LimitSettings) -> MotionLimits:
             )
     return MotionLimits(
         lower=lower, upper=upper, cable_speed=cable_speed, torque=torque,
-        cable_acceleration=np.inf if given.cable_acceleration is None else given.cable_acceleration,
-        inertia=winch.inertia or 0.0, ratio=ratio,
-        speed=np.inf if given.speed is None else given.speed,
+        cable_acceleration=acceleration, inertia=winch.inertia or 0.0, ratio=ratio, speed=speed,
     )  # fmt: skip
 
 
 def path_task(
     robot: Robot,
-    given: LimitSettings,
+    settings: LimitSettings,
     cables: CableSet | None = None,
     resist: SpatialSet | None = None,
 ) -> PathTask:
-    """A robot for planning, with its limits less the reserve if one is given.
+    """A robot for planning, with its limits less the reserve if one is settings.
 
     Args:
         robot: The robot.
-        given: Limits beside its own.
+        settings: Limits beside its own.
         cables: Its cables; None: over its pulleys.
         resist: Wrenches on the platform that every point of a path must resist; None: none.
 
@@ -127,15 +143,40 @@ def path_task(
     dynamics = moved_dynamics(robot)
     lifts = UPWARDS in dynamics.motions
     weight = robot.platform.mass * robot.gravity if lifts else 0.0
-    limits = robot_limits(robot, given).within(given.reserve or 0.0, weight)
+    limits = robot_limits(robot, settings).within(settings.reserve or 0.0, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
     if resist is None:
         return PathTask(cables, dynamics, limits, names)
-    found = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
-    corners = np.zeros((len(found), 6))
-    corners[:, list(dynamics.motions)] = found
+    rows = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
+    corners = np.zeros((len(rows), 6))
+    corners[:, list(dynamics.motions)] = rows
     return PathTask(cables, dynamics, limits, names, corners)
+
+
+def robot_task(
+    robot: Robot, settings: LimitSettings, pulleys: bool,
+    resist: SpatialSet | Path | str | None = None,
+) -> PathTask:  # fmt: skip
+    """The robot as it is planned with; `resist` is a set of wrenches, or its file.
+
+    Raises:
+        CdprError: As `path_task`; the file cannot be read.
+    """
+    cables = robot.cable_set(pulleys)
+    if not isinstance(resist, str | Path):
+        return path_task(robot, settings, cables, resist)
+    wrenches = load_wrench_set(Path(resist))
+    try:
+        return path_task(robot, settings, cables, wrenches)
+    except WrenchSetError as problem:
+        raise WrenchSetError(f"{resist}: {problem}") from problem
+
+
+def pose_in_degrees(X_WP: RigidTransform) -> list[float]:
+    """x, y, z [m], phi, theta, psi [deg]."""
+    angles = np.degrees(angles_from_rotation(X_WP.rotation()))
+    return [*X_WP.translation().tolist(), *angles.tolist()]
 
 
 def moved_dynamics(robot: Robot) -> PlatformDynamics:

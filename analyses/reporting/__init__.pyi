@@ -6,5 +6,4 @@ from .log_files import write_whole as write_whole
 from .output_folder import continued_folder as continued_folder
 from .output_folder import results_folder as results_folder
 from .output_folder import resumed_folder as resumed_folder
-from .progress import WorkSession as WorkSession
 from .written_files import whole_file as whole_file

@@ -1,10 +1,8 @@
-"""Where long work stands, and how it is done."""
+"""Where long work stands."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -38,27 +36,3 @@ class WorkProgress:
         """How much is done, of how much, and how much of it was there, for JSON; `done` names the
         first."""
         return {done: self.done, "of": self.total, "by_earlier_sessions": self.found}
-
-
-@dataclass(frozen=True)
-class WorkSession:
-    """How long work is done; its numbers do not depend on it.
-
-    Attributes:
-        folder: Where what is finished is kept while it goes on, and found again; None: nowhere.
-        on_progress: Called at the start and after every piece of work.
-        should_stop: Asked often; True ends the work, and what was finished is kept.
-        workers: Number of local processes, with one this process does it; None: one for each
-            processor.
-        scheduler: Address of a Dask scheduler, whose workers compute instead.
-    """
-
-    folder: Path | None = None
-    on_progress: Callable[[WorkProgress], None] | None = None
-    should_stop: Callable[[], bool] | None = None
-    workers: int | None = None
-    scheduler: str | None = None
-
-
-NOBODY_FOLLOWS = WorkSession()
-"""Nobody looks, and nothing is kept."""

@@ -36,7 +36,7 @@ BAD_INPUT = 2
 """Exit code when the user's input is not accepted."""
 
 OLD = (
-    "workspace", "stability", "plan", "reconfigure", "design",
+    "workspace", "stability",
 )  # fmt: skip
 """Subcommands of the old app."""
 

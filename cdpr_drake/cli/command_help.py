@@ -13,21 +13,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr stability acrobot_large",
         "cdpr stability acrobot_large --scheme pbvs --json",
     ),
-    "plan": (
-        "Plan and design",
-        "cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
-        "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4",
-    ),
-    "reconfigure": (
-        "Plan and design",
-        "cdpr reconfigure acrobot_large --rails rails.yaml --poses 0.2,0,0.4",
-        "cdpr reconfigure caroca --rails rails.yaml --path poses.csv",
-    ),
-    "design": (
-        "Plan and design",
-        "cdpr design acrobot_large --goal capacity-margin",
-        "cdpr design acrobot_large --goal static --goal accuracy --quick",
-    ),
 }
 """Subcommands in the order of the help: group, and two lines to try or to change."""
 

@@ -119,6 +119,26 @@ COMMANDS = {
         ("cdpr equilibria grab_three --position 0.6,1.16,-1.5",
          "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3"),
     ),
+    "plan": Command(
+        _PLAN, f"{_VERBS}.planning.command:plan",
+        "Plans a motion within limits of tensions and winches: on a path, a free one, or a proven "
+        "one.",
+        ("cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
+         "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4"),
+    ),
+    "reconfigure": Command(
+        _PLAN, f"{_VERBS}.design.reconfiguration:reconfigure",
+        "Places exit points along rails so that poses or a path are feasible or best, with a "
+        "proof.",
+        ("cdpr reconfigure acrobot_large --rails rails.yaml --poses 0.2,0,0.4",
+         "cdpr reconfigure caroca --rails rails.yaml --path poses.csv"),
+    ),
+    "design": Command(
+        _PLAN, f"{_VERBS}.design.optimization:optimize_design",
+        "Searches for the best points, number of cables, drum and motor of a robot.",
+        ("cdpr design acrobot_large --goal capacity-margin",
+         "cdpr design acrobot_large --goal static --goal accuracy --quick"),
+    ),
     "import-log": Command(
         _MACHINES, f"{_CLI}.import_log:import_log",
         "Reads a log as a machine or a tracker wrote it, and writes one that calibrate and "

@@ -21,4 +21,4 @@ for robot, goal, force, anchors in (
     settings.anchor_points.reach = np.full(3, anchors)
     settings.mirrors = [MirrorSettings(axis="xy", pairs=["C1-C5", "C2-C6", "C3-C7", "C4-C8"])]
     boxes = 8000 if generations < 20 else 200_000  # of the proof of what was gained
-    print(cdpr.optimize_design(robot, settings, generations=generations, boxes=boxes))
+    print(cdpr.optimize_design(robot, parameters=settings, generations=generations, boxes=boxes))

@@ -50,7 +50,7 @@ for name, scene in list(product(ROBOTS, SCENES))[:count]:
         words = f"{name}, {scene}, {np.linalg.norm(goal - start):.3f}"
         try:
             run = cdpr.plan_proven_motion(robot, start, goal, sets=sets)
-            lengths = f"{run.found.path.length:.3f}, {run.found.path.lower_bound:.3f}"
-            print(f"{words}, {lengths}, {run.plan.duration:.1f}, {sum(run.judged[1].values())}")
+            lengths = f"{run.in_sets.path.length:.3f}, {run.in_sets.path.lower_bound:.3f}"
+            print(f"{words}, {lengths}, {run.solution.duration:.1f}, {sum(run.judged[1].values())}")
         except cdpr.CdprError as refusal:
             print(f"{words}: {refusal}")

@@ -10,19 +10,18 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.front import simulation, stability, workspaces
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.cli import plan
 
 
 @contextmanager
 def only(*endings):
-    """Lets runs, plans and grids write their data and, of pictures, files with these endings."""
+    """Lets runs and grids write their data and, of pictures, files with these endings."""
 
     def write(folder, pictures, *more):
         kept = {name: draw for name, draw in pictures.items() if name.endswith(endings)}
         return write_pictures(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (simulation, plan, stability, workspaces):
+        for module in (simulation, stability, workspaces):
             patch.setattr(module, "write_pictures", write)
         yield
 

@@ -33,11 +33,11 @@ LONG_WORK = {
     "workspace": [SESSION],
     "stability": [SESSION],
     "plan": [
-        "cdpr_drake.analyses.front.planning.solve_free_motion",
-        "cdpr_drake.analyses.front.proven_motions.ProvenSets.find",
+        "cdpr_drake.analyses.planning.free_plan.solve_free_motion",
+        "cdpr_drake.analyses.planning.proven_plan.ProvenSets.find",
     ],
-    "reconfigure": ["cdpr_drake.analyses.front.reconfiguration.reconfigured"],
-    "design": [SESSION],
+    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.reconfigured"],
+    "design": ["cdpr_drake.analyses.design.optimization.search_design"],
     "calibrate": [
         "cdpr_drake.analyses.front.calibration.calibrate_log",
         "cdpr_drake.analyses.front.simulated_fits.run_campaign",

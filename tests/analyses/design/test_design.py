@@ -1,5 +1,6 @@
 """Designs as robot files, their goals, the search that continues, and the proof."""
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -11,12 +12,17 @@ import yaml
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
 from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
-from cdpr_drake.analyses.design.maximin import SLOPES
-from cdpr_drake.analyses.design.results import DesignResult, write_design
-from cdpr_drake.analyses.design.search import evaluate_original, goal_context, search_design
+from cdpr_drake.analyses.design.optimization import Design, optimize_design, write_design
+from cdpr_drake.analyses.design.search import (
+    evaluate_original,
+    goal_context,
+    search_arguments,
+    search_design,
+)
+from cdpr_drake.analyses.design.search_methods import SLOPES
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
-from cdpr_drake.analyses.front.design import optimize_design
-from cdpr_drake.analyses.reporting.progress import WorkSession
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, DesignError
 from cdpr_drake.models.robot_loader import load_robot
@@ -79,36 +85,34 @@ def test_every_goal_is_a_number(name, candidates):
         assert 1e-4 < -value < 3e-2
 
 
-def stopped_after(count):
-    """A session whose search is stopped after some designs."""
-    seen = [0]
-
-    def ask():
-        seen[0] += 1
-        return seen[0] > count
-
-    return ask
+def searched(folder, found, settings, most=None):
+    """A search that is kept in a folder, and stopped after some designs."""
+    asked = itertools.count()
+    follow = Follow(stop=lambda: most is not None and next(asked) >= most)
+    arguments = search_arguments(found, settings, goal_context(ROBOT, settings.poses, settings))
+    with Folder(folder, arguments, grows=True) as results:
+        return search_design(ROBOT, found, settings, results, follow=follow)
 
 
 def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, candidates):
     pytest.importorskip("cmaes")
     settings = wanted("wrench-feasible")
     whole = search_design(ROBOT, candidates, settings)
-    session = WorkSession(tmp_path / "one", should_stop=stopped_after(6))
-    part = search_design(ROBOT, candidates, settings, session)
-    assert part.interrupted
+    part = searched(tmp_path / "one", candidates, settings, 6)
+    assert not part.complete
     assert 0 < len(part.values) < len(whole.values)
-    again = search_design(ROBOT, candidates, settings, WorkSession(tmp_path / "one"))
-    assert not again.interrupted
-    assert again.progress.found >= len(part.values)
+    with (tmp_path / "one" / "judged.jsonl").open("a") as file:
+        file.write('["set0-gener')  # as a kill leaves it
+    again = searched(tmp_path / "one", candidates, settings)
+    assert again.complete
+    assert again.earlier == 6
     assert np.array_equal(again.values, whole.values)
     assert np.array_equal(again.coordinates, whole.coordinates)
-    more = search_design(
-        ROBOT, candidates, replace(settings, generations=4), WorkSession(tmp_path / "one")
-    )
+    more = searched(tmp_path / "one", candidates, replace(settings, generations=4))
     assert len(more.values) == len(whole.values) + 4
-    assert more.progress.found == len(whole.values)
-    file = write_design(again, ROBOT, tmp_path)
+    assert more.earlier == len(whole.values)
+    with Folder(tmp_path / "best", {}) as folder:
+        file = write_design(again, ROBOT, folder)
     best = again.best
     assert evaluate_goals(load_robot(str(file)), again.judging, again.names) == pytest.approx(
         again.values[best]
@@ -132,11 +136,13 @@ def test_several_goals_make_a_front(tmp_path):
     found = make_candidates(ROBOT, settings, "test")
     search = search_design(ROBOT, found, settings)
     assert set(search.sets.tolist()) == {0, 1}
-    DesignResult(ROBOT, search, ()).write(tmp_path)
-    assert (tmp_path / "pareto.png").is_file()
-    told = json.loads((tmp_path / "results.json").read_text())
+    design = Design(ROBOT, search)
+    assert design.plot("pareto").axes
+    with Folder(tmp_path / "out", {}) as folder:
+        design.write(folder)
+    told = json.loads((tmp_path / "out" / "results.json").read_text())
     assert len(told["front"]) == len(search.front) >= 1
-    rows = (tmp_path / "designs.csv").read_text().splitlines()
+    rows = (tmp_path / "out" / "designs.csv").read_text().splitlines()
     assert len(rows) == 1 + len(search.values)
 
 
@@ -236,7 +242,7 @@ def test_goals_that_a_robot_cannot_be_asked_for_are_named_at_once(
 ):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(DesignError, match=f"^goals{said}"):
-        optimize_design(robot, goal, generations=1)
+        optimize_design(robot, goals=goal, generations=1)
     code, _, err = command(capsys, robot, "--goal", goal)
     assert code == 2
     assert f"cdpr: --goal{said}" in err
@@ -244,7 +250,7 @@ def test_goals_that_a_robot_cannot_be_asked_for_are_named_at_once(
     Path("goals.yaml").write_text(yaml.safe_dump(content))
     code, _, err = command(capsys, robot, "--parameters", "goals.yaml")
     assert code == 2
-    assert f"cdpr: goals{said}" in err  # as the file names them
+    assert f"cdpr: goals.yaml: goals{said}" in err
 
 
 def test_a_set_of_too_few_cables_closes_nowhere():
@@ -260,11 +266,10 @@ def test_slopes_find_a_better_design_with_few_and_go_on_where_they_were_stopped(
     found = make_candidates(ROBOT, settings, "test")
     whole = search_design(ROBOT, found, settings)
     assert len(whole.scores) <= 8
-    stopped = WorkSession(tmp_path / "one", should_stop=stopped_after(5))
-    assert search_design(ROBOT, found, settings, stopped).interrupted
-    again = search_design(ROBOT, found, settings, WorkSession(tmp_path / "one"))
+    assert not searched(tmp_path / "one", found, settings, 5).complete
+    again = searched(tmp_path / "one", found, settings)
     np.testing.assert_array_equal(again.values, whole.values)
-    assert not again.interrupted
+    assert again.complete
     pytest.importorskip("cmaes")
     other = replace(settings, search="evolution", generations=10)
     evolved = search_design(ROBOT, found, other)

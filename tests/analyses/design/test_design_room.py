@@ -5,9 +5,13 @@ import sys
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.design.evolution import EvolutionSearch, default_population, pareto_front
-from cdpr_drake.analyses.design.maximin import SlopeSearch
-from cdpr_drake.analyses.design.moved_points import Mirror, MovedPoints
+from cdpr_drake.analyses.design.candidates import Mirror, MovedPoints
+from cdpr_drake.analyses.design.search_methods import (
+    EvolutionSearch,
+    SlopeSearch,
+    default_population,
+    pareto_front,
+)
 from cdpr_drake.errors import DesignError
 
 REACH = np.full((3, 4), 0.1)

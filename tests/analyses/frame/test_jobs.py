@@ -4,12 +4,13 @@ import os
 import signal
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 
 from cdpr_drake.analyses.frame import jobs as module
 from cdpr_drake.analyses.frame.job import ProcessDied
-from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.frame.jobs import Processes, finished_jobs
 from cdpr_drake.errors import SweepError
 from cdpr_drake.schema.input_files import input_text, inputs_read_once
 
@@ -92,6 +93,18 @@ def test_processes_are_replaced_after_some_jobs(monkeypatch):
     ids = [one.result for one in finished_jobs(process_id, range(8), 2)]
     assert max(map(ids.count, ids)) <= 3
     assert len(set(ids)) >= 3
+
+
+def test_standing_processes_are_the_same_in_every_call_and_end_with_their_block():
+    with Processes() as standing:
+        hosts = {
+            finished.result for _ in range(3)
+            for finished in finished_jobs(process_id, range(4), 2, standing=standing)
+        }  # fmt: skip
+        assert 1 <= len(hosts) <= 2
+        assert os.getpid() not in hosts
+        assert all(Path(f"/proc/{host}").exists() for host in hosts)
+    assert not any(Path(f"/proc/{host}").exists() for host in hosts)
 
 
 def test_jobs_elsewhere_see_files_as_they_were_read_here(tmp_path):

@@ -22,7 +22,13 @@ HOMES = {
 
 
 def shows_itself(result):
-    """As text and as HTML; what a verb returned also for JSON, and as a figure."""
+    """In a few lines, as text and as HTML; what a verb returned also for JSON, and as a figure."""
+    if isinstance(result, Result):
+        assert as_json(result)
+        assert isinstance(result.plot(), Figure)
+        assert "<table>" in result._repr_html_()
+        assert " object at 0x" not in repr(result)
+        return repr(result)
     if type(result) in RESULTS:
         assert as_json(result)
         assert isinstance(result.plot(), Figure)

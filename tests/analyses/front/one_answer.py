@@ -185,7 +185,7 @@ def by_plan(robot, X_WP, pulleys):
         way = np.eye(3)[np.argmax(robot.reach()[1] > robot.reach()[0])]
     there = RigidTransform(X_WP.rotation(), p + SHORT * way / np.linalg.norm(way))
     result = cdpr.plan_path(
-        robot, [X_WP, there], {"reserve": 0.0}, corners="rest", stations=10, pulleys=pulleys
+        robot, [X_WP, there], reserve=0.0, corners="rest", stations=10, pulleys=pulleys
     )
     return Answer(True, "", result.as_dict()["geometry"])
 

@@ -85,13 +85,15 @@ def test_an_identification(tmp_path):
 
 
 def test_a_design(planar, tmp_path):
-    found = cdpr.optimize_design(planar, "capacity-margin", tmp_path / "d", generations=1)
+    found = cdpr.optimize_design(
+        planar, goals="capacity-margin", folder=tmp_path / "d", generations=1
+    )
     told = json.loads((tmp_path / "d" / "results.json").read_text())
     assert found.as_dict()["best"] == told["best"]
     assert (tmp_path / "d" / "designs.csv").is_file()
-    again = cdpr.optimize_design("planar", "capacity-margin", generations=1)
+    again = cdpr.optimize_design("planar", goals="capacity-margin", generations=1)
     assert again.as_dict()["best"] == told["best"]
     shows_itself(found)
     assert isinstance(found.plot(), Figure)
-    one_line(lambda: cdpr.optimize_design(planar, "beauty"), "beauty")
-    one_line(lambda: cdpr.optimize_design(planar, "no.yaml"), "no.yaml")
+    one_line(lambda: cdpr.optimize_design(planar, goals="beauty"), "beauty")
+    one_line(lambda: cdpr.optimize_design(planar, parameters="no.yaml"), "no.yaml")

@@ -16,12 +16,12 @@ def run(capsys, *words):
     return end.value.code, out, err
 
 
-WRITES = "cdpr_drake.cli.plan.write_pictures"
+WRITES = "cdpr_drake.analyses.planning.plans.figure_writers"
 """What a test of a command without its figures makes do nothing."""
 
 
 def undrawn(*_):
-    """No picture, and none that failed."""
+    """No figures."""
     return {}
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.planning.cable_streams import CHECK, LENGTHS, cable_stream
-from cdpr_drake.analyses.planning.stream_figures import stream_figure
 from cdpr_drake.cables.models import CATENARY, ELASTIC, cable_state
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import pose_from_row
@@ -22,7 +22,7 @@ def run():
     robot = cdpr.load_robot("acrobot_fully_constrained")
     poses = [[0.0, 0.0, 0.4], [0.1, 0.1, 0.5], [-0.1, 0.1, 0.5]]
     places = [cdpr.Pose(position=np.array(p), angles_deg=np.zeros(3)).transform() for p in poses]
-    return cdpr.plan_path(robot, places, {"tensions": (5.0, 55.0)}, track=False)
+    return cdpr.plan_path(robot, places, limits=(5.0, 55.0))
 
 
 @pytest.mark.parametrize("model", [ELASTIC, CATENARY])
@@ -49,13 +49,13 @@ def test_a_stream_that_is_too_coarse_lets_cables_go_slack(run):
     assert fine.check.keeps_taut
     assert not coarse.check.keeps_taut
     assert np.min(coarse.check.least) < np.min(fine.check.least)
-    assert "CABLES GO SLACK" in coarse.words()
+    assert "CABLES GO SLACK" in repr(coarse)
 
 
 @pytest.mark.parametrize("model", [ELASTIC, CATENARY])
 def test_its_figure_has_what_drives_are_sent(run, model):
     stream = cable_stream(run, 50.0, model)
-    figure = stream_figure(stream)
+    figure = stream.plot()
     lengths, angles, stretch = figure.axes
     m = len(run.robot.cables)
     for place, values in (
@@ -71,9 +71,11 @@ def test_its_figure_has_what_drives_are_sent(run, model):
 
 
 def test_files_of_a_stream(run, tmp_path):
-    told = cable_stream(run, 50.0).write(tmp_path)
-    assert json.loads((tmp_path / CHECK).read_text()) == told
-    rows = np.genfromtxt(tmp_path / LENGTHS, delimiter=",", names=True)
+    stream = cable_stream(run, 50.0)
+    with Folder(tmp_path / "out", {}) as folder:
+        stream.write(folder)
+    assert json.loads((tmp_path / "out" / CHECK).read_text()) == stream.as_dict()
+    rows = np.genfromtxt(tmp_path / "out" / LENGTHS, delimiter=",", names=True)
     assert rows["time_s"][-1] == pytest.approx(run.motion.end_time)
 
 

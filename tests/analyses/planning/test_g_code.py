@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.front.planning import plan_path
 from cdpr_drake.analyses.planning.g_code import parse_g_code
 from cdpr_drake.analyses.planning.path_files import read_path
+from cdpr_drake.analyses.planning.path_plan import plan_path
 from cdpr_drake.errors import DataFileError
 from tests.analyses.planning.plan_command import WRITES, run, undrawn
 
@@ -209,18 +209,18 @@ def test_feeds_are_speeds_of_their_pieces(tmp_path, corners):
     file = tmp_path / "slot.nc"
     file.write_text(SLOT)
     fed, free = (
-        plan_path("acrobot_large", file, {"tensions": (1.0, 60.0), **more}, corners=corners,
-                  stations=300) for more in ({}, {"feeds": False})
+        plan_path("acrobot_large", file, limits=(1.0, 60.0), feeds=feeds, corners=corners,
+                  stations=300) for feeds in (True, False)
     )  # fmt: skip
-    samples, path = fed.samples, fed.plan.path
+    samples, path = fed.samples, fed.solution.path
     way = np.linalg.norm(path.points(samples.parameters)[:, 10:13], axis=1) * samples.speeds
     most = path.largest_speeds(samples.parameters)
     assert set(np.unique(most)) == {0.1, 0.05, 0.2}
     assert np.max(way / most) < 1.0 + 2e-3
     assert np.max(samples.uses[:, 3]) == pytest.approx(np.max(way / most))
     assert np.mean(samples.active()["speed of Po"]) > 0.5
-    assert free.plan.duration < 0.8 * fed.plan.duration
-    assert free.plan.path.speeds is None
+    assert free.solution.duration < 0.8 * fed.solution.duration
+    assert free.solution.path.speeds is None
     assert (len(path.rests) == 3) == (corners == "rest")
 
 

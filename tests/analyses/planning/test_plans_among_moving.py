@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.front.motions_in_time import judged_in_time
-from cdpr_drake.analyses.front.proven_motions import plan_proven_motion
-from cdpr_drake.analyses.planning.timed_plan_figures import timed_pictures
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.planning.proven_plan import plan_proven_motion
+from cdpr_drake.analyses.planning.timed_plan import judged_in_time
 from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
 from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles, load_obstacles
 from cdpr_drake.errors import DataFileError, PlanningError
@@ -42,8 +40,11 @@ def sets():
 
 @pytest.fixture(scope="module")
 def run(sets, tmp_path_factory):
-    path = write(tmp_path_factory.mktemp("files"), PASSING)
-    return plan_proven_motion(ROBOT, START, GOAL, obstacles=path, sets=sets)
+    files = tmp_path_factory.mktemp("files")
+    path = write(files, PASSING)
+    return plan_proven_motion(
+        ROBOT, START, GOAL, obstacles=path, sets=sets, track=False, folder=files / "out"
+    )
 
 
 def test_a_plan_waits_for_what_passes_and_all_samples_hold(run, sets):
@@ -52,7 +53,7 @@ def test_a_plan_waits_for_what_passes_and_all_samples_hold(run, sets):
     assert told["waits"]
     assert told["moving"] == ["boxes[0]"]
     assert sum(told["judged_infeasible"].values()) == 0
-    count, failed = judged_in_time(sets, run.found, run.things, run.around, 1000)
+    count, failed = judged_in_time(sets, run.in_sets, run.things, run.around, 1000)
     assert count == 1000
     assert set(failed) >= {"wrench-feasible", "cables off what moves", "platform off what moves"}
     assert sum(failed.values()) == 0
@@ -68,19 +69,17 @@ def test_the_motion_that_knows_of_nothing_that_moves_is_hit(run, sets):
     R = np.repeat(np.eye(3)[np.newaxis, np.newaxis], len(times), axis=0)
     gaps = moving_clearances(run.around, run.things, times, p[:, np.newaxis], R)
     assert np.any(gaps <= 0.0)
-    assert unaware.found.plan.duration < run.found.plan.duration
+    assert unaware.solution.duration < run.solution.duration
 
 
-def test_a_plan_writes_table_sets_figures_and_replay(run, tmp_path):
-    run.write(tmp_path)
-    failed = write_pictures(tmp_path, timed_pictures(run))
-    assert not failed
-    names = {path.name for path in tmp_path.iterdir()}
+def test_a_plan_writes_table_sets_figures_and_replay(run):
+    assert not run.failed
+    names = {path.name for path in run.folder.iterdir()}
     assert names >= {"motion.csv", "summary.json", "sets.yaml", "space_time.png", "sets.png",
                      "replay.html"}  # fmt: skip
-    told = json.loads((tmp_path / "summary.json").read_text())
+    told = json.loads((run.folder / "summary.json").read_text())
     assert told["sets"]["count"] == len(run.sets)
-    assert "time_s" in (tmp_path / "sets.yaml").read_text()
+    assert "time_s" in (run.folder / "sets.yaml").read_text()
 
 
 @pytest.mark.parametrize(

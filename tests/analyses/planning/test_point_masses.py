@@ -84,9 +84,9 @@ def test_blocks_and_tackles_turn_the_motor_further():
     tackled = replace(
         robot, cables=[replace(cable, mechanical_advantage=2.0) for cable in robot.cables]
     )
-    asked = {"cable_speed": 0.05}
     plain, twice = (
-        cable_stream(cdpr.plan_path(one, poses(places), asked), 20.0) for one in (robot, tackled)
+        cable_stream(cdpr.plan_path(one, poses(places), cable_speed=0.05), 20.0)
+        for one in (robot, tackled)
     )
     np.testing.assert_allclose(twice.motor_angles, 2.0 * plain.motor_angles, rtol=1e-12)
 
@@ -110,7 +110,7 @@ def test_the_command_streams_g_code_of_a_router(tmp_path, capsys, monkeypatch):
 
 def test_what_computed_torque_cannot_track_is_refused_before_it_is_planned():
     robot, places, _ = CASES["a wall"]
-    with pytest.raises(RobotFileError, match="accepted by computed torque, which --track asks for"):
+    with pytest.raises(RobotFileError, match="accepted by computed torque, which tracking needs"):
         cdpr.plan_path(robot, [cdpr.Pose(position=np.array(p)) for p in places], track=True)
 
 

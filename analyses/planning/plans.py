@@ -1,0 +1,354 @@
+"""A planned motion of any kind: its numbers, tables, figures and files."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.planning.cable_streams import CableStream, cable_stream
+from cdpr_drake.analyses.planning.plan_tracking import MOMENT, RATE, TrackedPlan, track_plan
+from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, robot_limits
+from cdpr_drake.analyses.reporting.exported_logs import write_columns
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.visualization.cable_figures import cable_figure, draw_cables
+from cdpr_drake.analyses.visualization.figure_files import figure_writers
+from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
+from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import StoppedError
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.palette import BOUND, DESIRED, PLATFORM, Look, nth_look
+from cdpr_drake.planning.free_path_solution import FreePathSolution
+from cdpr_drake.planning.limits import MotionLimits
+from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
+from cdpr_drake.planning.path_timing import PathPlan
+from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
+from cdpr_drake.trajectories.timed_path import TimedPath
+
+SUMMARY, MOTION = "summary.json", "motion.csv"
+
+REACHED = 0.99
+"""A limit counts as reached from this share of it on."""
+
+CROWDED = 24
+"""Rows of limits that a figure shows; of more, those that are reached longest."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class Plan(Result):
+    """A planned motion of a robot, of any kind.
+
+    Attributes:
+        robot: The robot.
+        limits: Limits of the robot, without reserve.
+        arguments: What was asked, for JSON.
+        planning_time: Time that planning took, with what it loads at its first use [s].
+        solution: The motion that was planned, with numbers of its solver.
+        tracked: What the simulated robot did; None if it was not simulated.
+        stream: The motion as drives follow it; None if nobody asked.
+        folder: Results folder; None if nothing was kept.
+        failed: Of files that could not be written, the name and why.
+    """
+
+    robot: Robot
+    limits: MotionLimits
+    arguments: Mapping[str, Any]
+    planning_time: float
+    solution: PathPlan | FreePathSolution
+    tracked: TrackedPlan | None = None
+    stream: CableStream | None = None
+    folder: Path | None = None
+    failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """What it is, in words for titles."""
+
+    @abstractmethod
+    def details(self) -> dict[str, Any]:
+        """What `as_dict` has of this kind alone."""
+
+    @property
+    def task(self) -> PathTask:
+        """The robot as it was planned with."""
+        return self.solution.task
+
+    @property
+    def motion(self) -> TimedPath:
+        """The motion."""
+        plan = self.solution
+        return plan.motion() if isinstance(plan, FreePathSolution) else plan.trajectory
+
+    @cached_property
+    def samples(self) -> MotionSamples:
+        """What the motion needs of cables and motors, as often as it is controlled."""
+        return self.solution.samples(RATE)
+
+    @property
+    def geometry(self) -> str:
+        """Geometry of the planned robot's cables in words, as `Robot.geometry_words`."""
+        return self.robot.geometry_words(self.task.cables.has_pulleys())
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        limits, samples = self.task.limits, self.samples
+        shares = np.max(samples.uses, axis=1)
+        result: dict[str, Any] = finite({
+            "robot": self.robot.name, "geometry": self.geometry, "arguments": self.arguments,
+            **self.details(),
+            "limits_of_the_plan": {
+                "tension_n": [limits.lower, limits.upper],
+                "cable_speed_m_s": limits.cable_speed,
+                "cable_acceleration_m_s2": limits.cable_acceleration,
+                "torque_nm": limits.torque,
+                "speed_m_s": limits.speed,
+            },
+            "largest_share_of_limits": float(np.max(shares)),
+            "instants_at_a_limit": float(np.mean(shares >= REACHED)),
+            "reached": self.reached(),
+            "tracked": None if self.tracked is None else self.tracked.as_dict(),
+            **({} if self.stream is None else {"stream": self.stream.as_dict()}),
+            "versions": package_versions(),
+        })  # fmt: skip
+        return result
+
+    def reached(self) -> dict[str, int]:
+        """Steps of control at which each limit is reached, of those that are."""
+        counts = {
+            name: int(np.sum(np.any(holds, axis=1)))
+            for name, holds in self.samples.active().items()
+        }
+        return {name: count for name, count in counts.items() if count}
+
+    def tables(self) -> list[Table]:
+        """Limits that are reached, and limits that the simulated robot uses."""
+        rows = [(name, str(count)) for name, count in self.reached().items()]
+        limits = Table(self.title, ("limit", "reached [ms]"), rows)
+        return [limits, *([] if self.tracked is None else self.tracked.tables())]
+
+    def lines(self) -> list[str]:
+        """Duration, what is special of the kind, limits, tracking, stream."""
+        samples, limits = self.samples, self.task.limits
+        shares = np.max(samples.uses, axis=1)
+        lines = [
+            *self.description(),
+            f"at a limit in {np.mean(shares >= REACHED):.1%} of all instants; largest share of a "
+            f"limit {np.max(shares):.4f}",
+            f"tensions {np.min(samples.tensions):.4g} to {np.max(samples.tensions):.4g} N, limits "
+            f"{limits.lower:g} to {limits.upper:g} N",
+        ]
+        for part in (self.tracked, self.stream):
+            lines += [] if part is None else part.lines()
+        return lines + ([] if self.folder is None else [f"results: {self.folder}"])
+
+    @abstractmethod
+    def description(self) -> list[str]:
+        """Lines on this kind of motion alone."""
+
+    def columns(self) -> dict[str, Array]:
+        """A row a step of control: pose, velocity, acceleration, and what cables do.
+
+        The last row is the end of the motion, wherever that lies between two steps of control.
+        """
+        parts = [self.samples]
+        if self.motion.end_time > parts[0].times[-1] + MOMENT:
+            end = np.array([self.motion.end_time])
+            parts.append(sample_motion(self.task, self.motion, end))
+
+        def joined(name: str) -> Array:
+            return np.concatenate([getattr(part, name) for part in parts])
+
+        times = joined("times")
+        rows = np.array([self.motion.motion(t) for t in times])
+        table = {TIME_COLUMN: times, "s_m": joined("parameters"), "ds_dt_m_s": joined("speeds")}
+        table |= {name: rows[:, k] for k, name in enumerate(MOTION_COLUMNS)}
+        for quantity, name, unit in (
+            ("tension", "tensions", "n"),
+            ("cable_speed", "cable_speeds", "m_s"),
+            ("cable_acceleration", "cable_accelerations", "m_s2"),
+            ("torque", "torques", "nm"),
+        ):
+            values = joined(name)
+            for k, cable in enumerate(self.robot.cables):
+                table[f"{quantity}_{cable.name}_{unit}"] = values[:, k]
+        table["largest_share_of_limits"] = np.max(joined("uses"), axis=1)
+        return table
+
+    def to_dataframe(self) -> Any:
+        """The columns as a pandas DataFrame."""
+        import pandas as pd  # takes half a second
+
+        return pd.DataFrame(self.columns())
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """Tensions, winches and the path in space; the stream if there is one."""
+        figures: dict[str, Callable[[], Figure]] = {
+            "tensions": partial(tension_figure, self),
+            "winches": partial(winch_figure, self),
+            "path": partial(plan_path_figure, self),
+        }
+        return figures | ({} if self.stream is None else {"stream": self.stream.plot})
+
+    def write(self, folder: Folder) -> None:
+        """Writes motion, stream and summary."""
+        with folder.file(MOTION) as part:
+            write_columns(part, self.columns())
+        if self.stream is not None:
+            self.stream.write(folder)
+        folder.write_json(SUMMARY, self.as_dict())
+
+    def pages(self) -> dict[str, Callable[[Path], object]]:
+        """Writers of files that are drawn like figures, by name."""
+        return {}
+
+
+Planned = TypeVar("Planned", bound=Plan)
+
+
+def finished(
+    plan: Planned, limit_settings: LimitSettings, results: Folder | None, *, track: bool | None,
+    stream: float | None, stream_model: str | None, formats: Sequence[str], follow: Follow,
+) -> Planned:  # fmt: skip
+    """A plan that is tracked and streamed, if that is asked for, and written into a folder.
+
+    Raises:
+        CdprError: The simulated robot or the stream cannot follow the motion, or a file cannot be
+            written.
+        StoppedError: The work was asked to stop.
+    """
+    folder = None if results is None else results.path
+    plan = replace(plan, limits=robot_limits(plan.robot, limit_settings), folder=folder)
+    is_point = plan.robot.motion_type().is_point
+    if track is None and results is not None and is_point:
+        follow.say("note: not tracked: computed torque moves bodies alone")
+    if track or (track is None and results is not None and not is_point):
+        end, words = plan.motion.end_time, f"Tracking the plan of {plan.robot.name}"
+        follow.doing(words)
+        tracked = track_plan(
+            plan.robot, plan.solution, plan.limits,
+            lambda now: follow.doing(f"{words}: {now:.0f} of {end:.0f} s"),
+        )  # fmt: skip
+        plan = replace(plan, tracked=tracked)
+    if stream is not None:
+        plan = replace(plan, stream=cable_stream(plan, stream, stream_model))
+    if results is not None:
+        written(plan, results, formats, follow, plan.pages())
+    return plan
+
+
+def written(
+    result: Any, results: Folder, formats: Sequence[str], follow: Follow,
+    pages: Mapping[str, Callable[[Path], object]] | None = None,
+) -> None:  # fmt: skip
+    """Writes a result into a folder: numbers first, then figures, one of which spoils no other.
+
+    Args:
+        result: A `Result` with `write(folder)`, and `failed`, to which files that fail are added.
+        results: The open folder.
+        formats: Formats of figures.
+        follow: Who follows.
+        pages: Writers of files that are drawn like figures, by name.
+
+    Raises:
+        OutputFolderError: A file of numbers cannot be written.
+        StoppedError: The work was asked to stop before all figures were drawn.
+    """
+    follow.doing("Writing results")
+    result.write(results)
+    writers = {**figure_writers(result.figures(), formats), **(pages or {})}
+    result.failed.update(results.write_all(writers, follow.stop))
+    if follow.stop():
+        raise StoppedError(
+            f"stopped before all figures were drawn; numbers are in {results.path}, and the same "
+            "command goes on"
+        )
+    results.complete()
+
+
+def titled(plan: Plan, words: str) -> str:
+    """Title of a figure."""
+    return f"{words}\n{plan.title}"
+
+
+def reached_rows(robot: Robot, samples: MotionSamples) -> list[tuple[str, Look, Array]]:
+    """Limits that are reached: name, look, and whether it is at each sample, shape (n,)."""
+    rows: list[tuple[str, Look, Array]] = []
+    for name, holds in samples.active().items():
+        for k in range(holds.shape[1]):
+            if not np.any(holds[:, k]):
+                continue
+            whole = holds.shape[1] == len(robot.cables)
+            cable = f"{robot.cables[k].name} " if whole else ""
+            rows.append((f"{cable}{name}", nth_look(k) if whole else PLATFORM, holds[:, k]))
+    longest = sorted(range(len(rows)), key=lambda i: -float(np.sum(rows[i][2])))[:CROWDED]
+    return [rows[i] for i in sorted(longest)]
+
+
+def tension_figure(plan: Plan) -> Figure:
+    """Tensions with the limits that the plan keeps: where one is reached, there is no choice."""
+    samples, limits = plan.samples, plan.samples.limits
+    log = {
+        "time": samples.times,
+        "tensions": samples.tensions,
+        "slack": np.zeros(samples.tensions.shape),
+    }
+    words = "Tensions of the plan, as far from their limits as can be"
+    return cable_figure(
+        titled(plan, words), plan.robot, log, "tensions", "tension [N]",
+        bounds=(round(limits.lower, 3), round(limits.upper, 3)),
+    )  # fmt: skip
+
+
+def winch_figure(plan: Plan) -> Figure:
+    """Speeds and accelerations of the cables, and torques of the motors, with their limits."""
+    samples, limits = plan.samples, plan.samples.limits
+    shown: list[tuple[str, Array, float]] = [
+        ("cable speed [m/s]", samples.cable_speeds, limits.cable_speed),
+        ("cable acceleration [m/s²]", samples.cable_accelerations, limits.cable_acceleration),
+    ]
+    if np.all(np.isfinite(samples.torques)):
+        shown.append(("motor torque [N m]", samples.torques, limits.torque))
+    figure = bare_figure(
+        (11.0, 1.2 + 3.0 * len(shown)), titled(plan, "What the plan asks of winches")
+    )
+    with styled():
+        places: Any = figure.subplots(len(shown), 1, sharex=True)
+        for number, (place, (label, values, bound)) in enumerate(zip(places, shown, strict=True)):
+            draw_cables(place, plan.robot, samples.times, values)
+            if bound <= 2.0 * float(np.max(np.abs(values))):
+                for side in (-bound, bound):
+                    style = line_style(BOUND) | {"linewidth": 1.2, "zorder": 1}
+                    place.axhline(side, label="limit" if side > 0.0 else None, **style)
+            place.set(ylabel=label)
+            place.margins(x=0.01)
+            if number == 0:
+                place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        places[-1].set(xlabel="time [s]")
+    return figure
+
+
+def plan_path_figure(plan: Plan) -> Figure:
+    """Where the platform goes: the plan, and the simulated robot where it was tracked."""
+    way = plan.motion.path
+    assert way is not None
+    points = way.points(np.linspace(0.0, way.length, 400))
+    paths = [Path3D(points[:, 4:7], "Po of the plan", DESIRED)]
+    rows = points[:, :7]
+    if plan.tracked is not None:
+        rows = plan.tracked.log["X_WP"]
+        paths.append(Path3D(rows[:, 4:], "Po of the simulated robot", PLATFORM))
+    log = {"X_WP": rows, "slack": np.zeros((len(rows), len(plan.robot.cables)))}
+    title = titled(plan, "Path of the platform")
+    return path_figure(title, plan.robot, plan.task.cables, log, paths)
