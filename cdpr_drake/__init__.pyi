@@ -23,7 +23,6 @@ from .analyses.front.simulated_fits import identify_in_simulation as identify_in
 from .analyses.front.simulation import continue_run as continue_run
 from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate
-from .analyses.front.stability import assess_stability as assess_stability
 from .analyses.front.statics import find_equilibria as find_equilibria
 from .analyses.front.statics import plot as plot
 from .analyses.front.statics import solve_forward_kinematics as solve_forward_kinematics
@@ -32,14 +31,16 @@ from .analyses.front.statics import solve_static as solve_static
 from .analyses.front.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.front.tensions import compare_tensions as compare_tensions
 from .analyses.front.tensions import solve_tensions as solve_tensions
-from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .analyses.logs.log_request import LogRequest as LogRequest
+from .analyses.simulation.stability_files import assess_run as assess_run
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case
 from .analyses.studies.study import Form as Form
 from .analyses.studies.study import Study as Study
 from .analyses.studies.study import run_study as run_study
 from .analyses.studies.study import studies as studies
+from .analyses.workspaces.stability import assess_stability as assess_stability
+from .analyses.workspaces.workspace import compute_workspace as compute_workspace
 from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError

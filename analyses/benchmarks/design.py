@@ -8,8 +8,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, seconds_per_call
-from cdpr_drake.analyses.workspaces.conditions import ConditionsTask
-from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
+from cdpr_drake.analyses.workspaces.conditions import conditions_at
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
@@ -66,16 +66,16 @@ def judged_row(points: int, repeats: int) -> TimingRow:
     robot = load_robot(ROBOT)
     lower, upper = np.array([-0.4, -0.4, 0.05]), np.array([0.4, 0.4, 0.9])
     grid = grid_by_count(lower, upper, (points,) * 3)
-    asked = WorkspaceRequest(required=SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0])))
+    required = SpatialSet(box=np.array([0.0, 0.0, 0.0, 5.0, 5.0, 5.0]))
     middle = np.full(candidates.size, 0.5)
-    about = pose_conditions(robot, asked)
+    about = pose_conditions(robot, required=required)
 
     def kernels() -> object:
-        return ConditionsTask(about, grid, ("wrench-feasible",), ())(0, grid.size)
+        return conditions_at(about, grid, ["wrench-feasible"], 0, grid.size)
 
     def whole() -> object:
-        design = pose_conditions(candidates.robot(0, middle), asked)
-        return ConditionsTask(design, grid, ("wrench-feasible",), ())(0, grid.size)
+        design = pose_conditions(candidates.robot(0, middle), required=required)
+        return conditions_at(design, grid, ["wrench-feasible"], 0, grid.size)
 
     file, alone = interleaved(
         [

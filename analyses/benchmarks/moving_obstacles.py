@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
-from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.worlds.motions import PathBody

@@ -16,7 +16,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     robot_limits,
 )
 from cdpr_drake.analyses.reporting.timing import TimingRow, interleaved, processor_seconds
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot

@@ -21,7 +21,7 @@ from cdpr_drake.analyses.reporting.timing import (
     seconds_each,
     seconds_per_call,
 )
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_distance_kernel import convex_distance, convex_work
 from cdpr_drake.geometry.convex_shapes import ConvexShape

@@ -14,7 +14,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.log_files import finite, write_json, write_whole
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, PlanningError, accepted_names
 from cdpr_drake.geometry.poses import angles_from_rotation

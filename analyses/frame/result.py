@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 WIDTH = 120
 """Of a result in a program without a terminal [characters]."""
 
+STOPPED = 130
+"""Exit code of a command that was stopped."""
+
 
 @dataclass(frozen=True)
 class Table:
@@ -46,6 +49,10 @@ class Result(ABC):
 
     def lines(self) -> Sequence[str]:
         """Sentences below the tables."""
+        return ()
+
+    def notes(self) -> Sequence[str]:
+        """Sentences on what was missing or stopped; a command says them on stderr."""
         return ()
 
     def figures(self) -> Mapping[str, Callable[[], Figure]]:

@@ -50,8 +50,9 @@ def words(
         return [value(token) for token in tokens] if many else value(tokens[0])
 
     return Parameter(
-        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer
-    )
+        name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer,
+        accepts_keys=False,
+    )  # fmt: skip
 
 
 def numbers(*sizes: int, by: str = ",") -> Callable[[str], Array]:

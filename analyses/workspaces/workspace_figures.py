@@ -1,42 +1,33 @@
-"""Figures of workspaces: planes coloured by a measure or by what holds, and wrench sets."""
+"""Figures of workspaces: planes by what holds or by a measure, breaks, boxes, wrench sets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from textwrap import wrap
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, plain_numbers
-from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
-from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED, SURVIVES
-from cdpr_drake.analyses.workspaces.conditions import MEASURES
-from cdpr_drake.analyses.workspaces.stability_figures import (
-    around_robot,
-    cell_edges,
-    draw_robot,
-    even_choice,
-    plane_axes,
-)
-from cdpr_drake.analyses.workspaces.workspace_question import RULES
-from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
+from cdpr_drake.analyses.workspaces.plane_panels import CELLS, draw_planes, plane_axes
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.workspaces import box_expansion_kernel
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.workspaces.workspace_result import Workspace
 
 OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 """Of cells where no kind holds, where some do, and where all do."""
@@ -51,7 +42,6 @@ PROVEN = {
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 MOST_PLANES = 12
-COLUMNS = 4
 
 LINE = 60
 """Characters in a line of a title."""
@@ -63,126 +53,166 @@ LEAST_CONTOURED = 5
 """Lines of equal measure are drawn over so many points in both directions; over fewer they are
 straight, and their numbers meet."""
 
+MARKERS = ("s", "o", "^", "D", "v")
+"""Symbols of reactions, in the order in which they were asked for."""
 
-def workspace_pictures(
-    workspace: RobotWorkspace,
-    formats: Sequence[str] = DEFAULT_FORMATS,
-    boxes: CertifiedBoxes | None = None,
-    robot: Robot | None = None,
-) -> Pictures:
-    """What draws the figures that a result suffices for, by the names of their files.
+BREAK_PLANES, BREAK_COLUMNS = 6, 3
 
-    Args:
-        workspace: The result.
-        formats: Endings of the files.
-        boxes: Certified boxes; None: there are none.
-        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
-    """
-    drawn: dict[str, Callable[[], Figure]] = {
-        name or "planes": partial(planes_figure, workspace, name, robot)
-        for name in (None, *workspace.values) if name not in NUMBERED
-    }  # fmt: skip
-    if SURVIVES in workspace.holds:
-        drawn["breaks"] = partial(breaks_figure, workspace)
-    if boxes is not None:
-        about = workspace.arguments
-        drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], workspace.geometry)
-        drawn["boxes"] = partial(box_planes_figure, boxes, about["robot"], list(about["kinds"]))
-    return dict(figure_writers(drawn, formats))
+KEPT, LOST, UNHELD = "#ffffff", "#c8c8c8", "#8a8a8a"
+"""Of cells where every break is survived, where one is not, and that all cables do not hold."""
+
+LOOKS = {
+    KEPT: (None, "every break is survived"),
+    LOST: ("///", "one is not"),
+    UNHELD: (None, "not held by all cables"),
+}
+"""Hatching and label by colour."""
 
 
-def planes_figure(
-    workspace: RobotWorkspace, measure: str | None = None, robot: Robot | None = None
-) -> Figure:
+def planes_figure(workspace: Workspace, measure: str | None = None) -> Figure:
     """Planes of a grid, coloured by what holds, or by a measure where all kinds hold.
 
-    Planes are horizontal, but where the grid has one point along x or y and several along z. With
-    several orientations a measure is its least over them.
+    With several orientations a measure is its least over them.
 
     Args:
-        workspace: The result.
+        workspace: The result; with its robot, frame and exit points are drawn.
         measure: Name of a measure of the result; None: what holds.
-        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
     """
-    normal, u, v = plane_axes(workspace.grid.shape[1:])
-    places = workspace.grid.axes[normal]
-    chosen = even_choice(len(places), MOST_PLANES)
-    edges = cell_edges(workspace.grid.axes, (u, v))
-    rows = -(-len(chosen) // COLUMNS)
-    columns = -(-len(chosen) // rows)
-    lower, upper = np.array([[e[0], e[-1]] for e in edges]).T
-    if robot is not None:
-        lower, upper = around_robot(robot, (u, v), lower, upper)
-    extents = upper - lower
-    width, height = extents * (3.0 if columns > 1 else 5.5) / np.max(extents)
-    figure, grid = new_figure(
-        rows,
-        columns,
-        (max(1.6 + (width + 0.3) * columns, 6.5), 2.2 + (height + 0.4) * rows),
-        _title(workspace, measure),
+    return _kinds_figure(workspace) if measure is None else _measure_figure(workspace, measure)
+
+
+def _kinds_figure(workspace: Workspace) -> Figure:
+    each = [workspace.places(kind) for kind in workspace.holds]
+    parts = np.where(workspace.places(ALL), 2.0, np.where(np.any(each, axis=0), 1.0, 0.0))
+    colors = ListedColormap([OUTSIDE, SOME, INSIDE])
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        axes.pcolormesh(*edges, plane(parts), cmap=colors, vmin=-0.5, vmax=2.5)
+
+    title = _title(workspace, None)
+    panels = draw_planes(
+        workspace.grid, title, paint, workspace.robot, most=MOST_PLANES, parts=parts
     )
-    panels: list[Axes] = list(np.ravel(grid))
-    inside = workspace.places(ALL)
-    if measure is None:
-        kinds = [workspace.places(kind) for kind in workspace.holds]
-        cells = np.sum(kinds, axis=0) > 0
-        shown: Array = np.where(inside, 2.0, np.where(cells, 1.0, 0.0))
-        limits = (-0.5, 2.5)
-        colors: Colormap = ListedColormap([OUTSIDE, SOME, INSIDE])
-    else:
-        held = workspace.inside()
-        # With no pose inside there is nothing else to see; the title says so.
-        shown = _least(workspace.values[measure], held if held.any() else np.ones_like(held))
-        known = shown[np.isfinite(shown)]
-        limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
-        # A plane without a number would be an empty panel.
-        colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
-    mesh = None
-    for number, (axes, k) in enumerate(zip(panels, chosen, strict=False)):
-        plane = np.take(shown, k, normal).T
-        mesh = axes.pcolormesh(*edges, plane, cmap=colors, vmin=limits[0], vmax=limits[1])
-        if measure is not None and min(plane.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
-            _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
-        if robot is not None:
-            draw_robot(axes, robot, (u, v), edges)
-            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
-        axes.set_aspect("equal")
-        axes.grid(False)
-        axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
-        axes.tick_params(labelsize=10)
-        plain_numbers(axes.xaxis)
-        plain_numbers(axes.yaxis)
-        first, lowest = number % columns == 0, number + columns >= len(chosen)
-        axes.tick_params(labelleft=first, labelbottom=lowest)
-        axes.set_ylabel(f"{'xyz'[v]} in W [m]" if first else "")
-        axes.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
-    for axes in panels[len(chosen) :]:
-        axes.remove()
-    lines, _ = panels[0].get_legend_handles_labels()
-    if measure is None:
-        labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
-        if len(workspace.holds) == 1:
-            del labels[SOME]
-        figure.legend(
-            handles=[
-                *(Patch(facecolor=color, label=label) for color, label in labels.items()),
-                *lines,
-            ],
-            loc="outside lower center",
-            ncols=3,
-            title="Each point of the grid colours the cell around it.",
-            title_fontsize=10,
-        )
-    elif mesh is not None:
-        about = MEASURES[measure]
-        figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
-        handles: list[Artist] = [*lines]
-        if np.any(np.isnan(np.take(shown, chosen, normal))):
-            words = "outside" if workspace.inside().any() else "no number"
-            handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
-        if handles:
-            figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    return figure
+    labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
+    if len(workspace.holds) == 1:
+        del labels[SOME]
+    patches = [Patch(facecolor=color, label=label) for color, label in labels.items()]
+    panels.figure.legend(
+        handles=[*patches, *panels.handles], loc="outside lower center", ncols=3, title=CELLS,
+        title_fontsize=10,
+    )  # fmt: skip
+    return panels.figure
+
+
+def _measure_figure(workspace: Workspace, measure: str) -> Figure:
+    inside = workspace.inside()
+    # With no pose inside there is nothing else to see; the title says so.
+    values = _least(workspace.values[measure], inside if inside.any() else np.ones_like(inside))
+    known = values[np.isfinite(values)]
+    limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
+    # A plane without a number would be an empty panel.
+    colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
+    points = [workspace.grid.axes[k] for k in plane_axes(workspace.grid.shape[1:])[1:]]
+    mesh = []
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        shown = plane(values)
+        mesh.append(axes.pcolormesh(*edges, shown, cmap=colors, vmin=limits[0], vmax=limits[1]))
+        if min(shown.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
+            _contours(axes, points, shown, limits)
+
+    panels = draw_planes(
+        workspace.grid, _title(workspace, measure), paint, workspace.robot, most=MOST_PLANES
+    )
+    about = MEASURES[measure]
+    panels.figure.colorbar(mesh[-1], ax=panels.axes, label=f"{about.title} [{about.unit}]")
+    handles: list[Artist] = [*panels.handles]
+    if np.any(np.isnan(panels.shown(values))):
+        words = "outside" if inside.any() else "no number"
+        handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
+    if handles:
+        panels.figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return panels.figure
+
+
+def breaks_figure(workspace: Workspace) -> Figure:
+    """Planes of a grid: a cell a pose, with its worst cable and the best reaction to that break.
+
+    Of several orientations the first one is drawn, and the title says so. It can be read without
+    colours: hatching, numbers and symbols say all of it.
+
+    Args:
+        workspace: A result with the kind `dynamic-single-failure`.
+    """
+    shape = workspace.grid.shape[1:]
+    arrays = [workspace.holds[SURVIVES], workspace.values[WORST], workspace.values[BEST]]
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        smallest = 72.0 * 3.6 / max(shape)  # side of a cell [pt], about
+        _draw_breaks(axes, edges, [plane(array[0]) for array in arrays], smallest)
+
+    panels = draw_planes(
+        workspace.grid, _breaks_title(workspace), paint, most=BREAK_PLANES, columns=BREAK_COLUMNS,
+        width=3.6,
+    )  # fmt: skip
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=color, edgecolor="black", hatch=hatch, label=label)
+        for color, (hatch, label) in LOOKS.items()
+    ]
+    handles += [
+        Line2D([], [], color="black", marker=marker, linestyle="none", markerfacecolor="white",
+               label=f"best: {name}")
+        for name, marker in zip(workspace.arguments["breaks"]["reactions"], MARKERS, strict=False)
+    ]  # fmt: skip
+    panels.figure.legend(
+        handles=handles, loc="outside lower center", ncols=3, title_fontsize=10,
+        title="Number: the cable whose break is worst. Symbol: the best reaction to it.",
+    )  # fmt: skip
+    return panels.figure
+
+
+def _draw_breaks(axes: Axes, edges: list[Array], planes: list[np.ndarray], smallest: float) -> None:
+    """Cells of a plane: verdicts, numbers of cables and of reactions, shape (nv, nu) each."""
+    survives, worst, best = planes
+    across, up = edges
+    for j, i in np.ndindex(*survives.shape):
+        low = float(across[i]), float(up[j])
+        high = float(across[i + 1]), float(up[j + 1])
+        held = bool(np.isfinite(worst[j, i]))
+        color = KEPT if survives[j, i] else LOST if held else UNHELD
+        axes.add_patch(
+            Rectangle(
+                low, high[0] - low[0], high[1] - low[1], facecolor=color, edgecolor="0.4",
+                linewidth=0.5, hatch=LOOKS[color][0], hatch_linewidth=0.4,
+            )
+        )  # fmt: skip
+        if not held:
+            continue
+        x, y = 0.5 * (low[0] + high[0]), low[1] + 0.68 * (high[1] - low[1])
+        axes.text(
+            x, y, f"{int(worst[j, i])}", ha="center", va="center",
+            fontsize=float(np.clip(0.42 * smallest, 4.0, 12.0)),
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+        )  # fmt: skip
+        axes.plot(
+            [x], [low[1] + 0.28 * (high[1] - low[1])], color="black", markerfacecolor="white",
+            marker=MARKERS[int(best[j, i]) - 1], markersize=float(np.clip(0.26 * smallest, 2, 8)),
+        )  # fmt: skip
+    axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
+
+
+def _breaks_title(workspace: Workspace) -> str:
+    about = workspace.arguments["breaks"]
+    speed = float(np.linalg.norm(about["moving_m_s"]))
+    turns = len(workspace.grid.angles)
+    words = "at rest" if speed == 0.0 else f"at {speed:.3g} m/s"
+    share = float(np.mean(workspace.holds[SURVIVES]))
+    several = f", first of {turns} orientations" if turns > 1 else ""
+    geometry = workspace.geometry
+    return (
+        f"{workspace.arguments['robot']}, {geometry}: any one cable breaks {words}{several}\n"
+        f"survived at {share:.0%} of the poses"
+    )
 
 
 def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
@@ -276,7 +306,7 @@ def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float,
     axes.clabel(lines, fmt="%.3g", fontsize=8)
 
 
-def _title(workspace: RobotWorkspace, measure: str | None) -> str:
+def _title(workspace: Workspace, measure: str | None) -> str:
     about = workspace.arguments
     volume = workspace.volume()
     what = ", ".join(workspace.holds) if measure is None else MEASURES[measure].title

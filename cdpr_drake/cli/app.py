@@ -23,7 +23,7 @@ from typing import Annotated, Any, NoReturn, get_args
 from cyclopts import App, CoercionError, CycloptsError, Group, MissingArgumentError, Parameter
 
 from cdpr_drake.blas_threads import ONE_THREAD, one_blas_thread, started_with_one_thread
-from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
+from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS, Command
 from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
 from cdpr_drake.errors import CdprError, StoppedError, accepted_names, plain_words
@@ -65,12 +65,25 @@ def make_app(given: Sequence[str]) -> App:
     for name, command in COMMANDS.items():
         words = {} if name == asked else {"help": command.line}
         examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
+        for option in command.instead:
+            examples += f"\n\nAnother question: `cdpr {name} --{option}`, with `--help` for more"
         app.command(
-            command.verb, name=name, group=groups[command.group], help_epilogue=examples, **words
+            _verb_of(command, given) if name == asked else command.verb,
+            name=name,
+            group=groups[command.group],
+            help_epilogue=examples,
+            **words,
         )
     app.default(_show_first_steps)
+    app.meta.suppress_keyboard_interrupt = False
     app.register_install_completion_command(name="completion", group=groups["Tools"])
     return app
+
+
+def _verb_of(command: Command, given: Sequence[str]) -> str:
+    """Module and function that answer a command line."""
+    options = {word.partition("=")[0].removeprefix("--") for word in given if word[:2] == "--"}
+    return next((verb for name, verb in command.instead.items() if name in options), command.verb)
 
 
 def _joined(given: Sequence[str]) -> list[str]:
@@ -115,9 +128,7 @@ class _Call:
         @app.meta.default
         def meta(
             *words: Annotated[str, Parameter(show=False, allow_leading_hyphen=True)],
-            json: Annotated[
-                bool, Parameter(negative=(), group=SHARED, show_default=False)
-            ] = False,
+            json: Annotated[bool, Parameter(negative=(), group=SHARED, show_default=False)] = False,
             plot: Annotated[
                 list[str] | None, Parameter(metavar="[FIGURE=]FILE", group=SHARED, n_tokens=1)
             ] = None,
@@ -170,6 +181,8 @@ class _Call:
         failed = getattr(result, "failed", {})
         for file, why in failed.items():
             console.print(f"cdpr: {file}: not written: {why}")
+        for line in result.notes():
+            console.print(with_options(line, self.options))
         return result.exit_code or (INCOMPLETE if failed else 0)
 
 

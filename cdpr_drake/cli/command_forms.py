@@ -5,19 +5,18 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, get_args, get_origin, get_type_hints
 
 from typer.models import OptionInfo
 
+from cdpr_drake.cli.app import make_app
+from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.cli.replay import replay
-from cdpr_drake.cli.stability import stability
 from cdpr_drake.cli.study import study
-from cdpr_drake.cli.workspace import workspace
 from cdpr_drake.studio.workbench.command_form import CommandForm, CommandOption, OptionKind
 
 OFFERED: dict[str, Callable[..., Any]] = {
-    "workspace": workspace,
-    "stability": stability,
     "study": study,
     "replay": replay,
 }
@@ -34,7 +33,31 @@ KINDS_OF = {
 
 def command_forms() -> dict[str, CommandForm]:
     """Forms of the commands in `OFFERED` by name."""
-    return {name: _form(name, function) for name, function in OFFERED.items()}
+    forms = {name: _form_of_verb(name) for name in ("workspace", "stability")}
+    return forms | {name: _form(name, function) for name, function in OFFERED.items()}
+
+
+def _form_of_verb(name: str) -> CommandForm:
+    verb = resolve_name(COMMANDS[name].verb)
+    parameters = inspect.signature(verb).parameters
+    options = []
+    for argument in make_app([name])[name].assemble_argument_collection(parse_docstring=True):
+        parameter, option = parameters[argument.field_info.name], argument.name
+        if parameter.default is parameter.empty or not argument.show:
+            continue
+        usual = parameter.default
+        if isinstance(usual, tuple | list):
+            usual = ",".join(map(str, usual))
+        kinds = [part for part in get_args(argument.hint) if part is not type(None)]
+        shown = CommandOption(
+            name=option, words=str(argument.parameter.help or ""),
+            kind=KINDS_OF.get((kinds or [argument.hint])[0], OptionKind.TEXT),
+            many=parameter.name in ("velocities", "orientation", "vary"),
+            usual="" if usual is None or isinstance(usual, bool) else str(usual),
+        )  # fmt: skip
+        if shown.key not in LEFT_OUT:
+            options.append(shown)
+    return CommandForm(name, COMMANDS[name].line, tuple(options))
 
 
 def _form(name: str, function: Callable[..., Any]) -> CommandForm:

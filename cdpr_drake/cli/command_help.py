@@ -58,16 +58,6 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
         "cdpr equilibria grab_three --position 0.6,1.16,-1.5",
         "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3",
     ),
-    "workspace": (
-        "Analyse",
-        "cdpr workspace acrobot_large",
-        "cdpr workspace acrobot_large --kind static,interference-free --certify",
-    ),
-    "stability": (
-        "Analyse",
-        "cdpr stability acrobot_large",
-        "cdpr stability acrobot_large --scheme pbvs --json",
-    ),
     "plan": (
         "Plan and design",
         "cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",

@@ -62,7 +62,6 @@ FIRST_ARGUMENT: dict[str, Complete] = {
     "static": robot_or_mechanism_words,
     "equilibria": robot_words,
     "design": robot_words,
-    "stability": robot_words,
     "plan": robot_words,
     "reconfigure": robot_words,
     "view": robot_or_mechanism_words,

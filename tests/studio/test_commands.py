@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
+from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.app import main
 from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
-from cdpr_drake.cli.workspace import workspace
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio.workbench.command_board import CommandBoard
@@ -42,13 +42,14 @@ def test_a_form_has_every_option_of_its_command(forms, capsys):
     help_words = capsys.readouterr().out
     offered = {option.name for option in forms["workspace"].options}
     assert all(name in help_words for name in offered)
-    parameters = set(workspace.__annotations__) - {"return", "robot", "out", "as_json", "scheduler"}
+    own = {"return", "robot", "folder", "overwrite", "follow"}
+    parameters = set(compute_workspace.__annotations__) - own
     assert len(offered) == len(parameters)
     assert not {option.key for form in forms.values() for option in form.options} & LEFT_OUT
     assert forms["workspace"].option("rays").usual == "10000"
     assert forms["workspace"].option("velocity").many
     assert forms["study"].option("quick").kind == OptionKind.FLAG
-    assert forms["stability"].option("format").usual == "png"
+    assert forms["stability"].option("figure-format").usual == "png"
 
 
 def test_arguments_are_what_was_filled_in(forms, tmp_path):

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.front.statics import solve_static
 from cdpr_drake.analyses.front.tensions import solve_tensions
 from cdpr_drake.analyses.statics.tension_query import applicable_methods
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
-from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_schema import Robot
