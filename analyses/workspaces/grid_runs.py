@@ -6,17 +6,23 @@ import hashlib
 import json
 import shutil
 import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
-from cdpr_drake.analyses.frame.follow import Count, Follow
+from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.frame.result import STOPPED, Result
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+from cdpr_drake.analyses.reporting.output_folder import shown_path
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DataFileError, StoppedError, SweepError
 from cdpr_drake.models.robot_schema import Robot
@@ -27,6 +33,9 @@ from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
 ARRAYS = "workspace.npz"
 """All arrays of a result, with what they were computed for as JSON in the array `about`."""
+
+RESULTS = "results.json"
+"""File of the numbers of a result."""
 
 CHUNKS = "chunks"
 """Folder of finished chunks, until `ARRAYS` is written."""
@@ -128,6 +137,85 @@ def chunk_arrays(parts: Mapping[str, PoseArrays], job: Chunk) -> dict[str, np.nd
 def _file(job: Chunk) -> str:
     name, start, stop = job
     return f"{CHUNKS}/{name}-{start:07d}-{stop:07d}.npz"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class GridResult(Result):
+    """What is known over the poses of a grid, and where it is kept.
+
+    Attributes:
+        arguments: All that the arrays depend on.
+        grid: The poses.
+        versions: Versions of what computed the arrays.
+        robot: The robot; None if the result was read from a file.
+        folder: The results folder; None if nothing is kept.
+        failed: Why figures were not written, by file.
+        stopped: True if something is missing since the call was stopped.
+    """
+
+    arguments: dict[str, Any]
+    grid: WorkspaceGrid
+    versions: dict[str, str]
+    robot: Robot | None = None
+    folder: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
+    stopped: bool = False
+
+    @property
+    def exit_code(self) -> int:
+        """130 if the call was stopped."""
+        return STOPPED if self.stopped else 0
+
+    @property
+    def geometry(self) -> str:
+        """Geometry of the cables in words, as `Robot.geometry_words`."""
+        return str(self.arguments.get("geometry", "geometry not recorded"))
+
+    @abstractmethod
+    def columns(self) -> dict[str, np.ndarray]:
+        """A row a pose: positions and angles, and what is known there."""
+
+    def to_dataframe(self) -> Any:
+        """The columns as a pandas DataFrame."""
+        import pandas as pd  # half a second, which few need
+
+        return pd.DataFrame(self.columns())
+
+    @abstractmethod
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """What writes the page for the browser, and what should be known of it."""
+
+    def last_lines(self) -> list[str]:
+        """Sentences on how it ended and where it is."""
+        return [
+            *(["stopped; the same call goes on"] if self.stopped else []),
+            *([] if self.folder is None else [f"results: {shown_path(self.folder)}"]),
+        ]
+
+    def write(
+        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
+    ) -> dict[str, str]:
+        """Writes numbers, figures and the page.
+
+        Returns:
+            Why figures were not written, by file.
+        """
+        folder.write_json(RESULTS, self.as_dict())
+        page, note = ({}, "") if self.robot is None else self.page(self.robot)
+        if note:
+            follow.say(f"note: {note}")
+        return folder.write_all(figure_writers(self.figures(), formats) | page, follow.stop)
+
+    def written(self, folder: Folder | None, formats: Sequence[str], follow: Follow) -> Self:
+        """The result with its folder, in which its files are; the same if nothing is kept."""
+        if folder is None:
+            return self
+        result = replace(self, folder=folder.path)
+        failed = result.write(folder, formats, follow)
+        if not (failed or result.stopped):
+            folder.complete()
+        stopped = result.stopped or (bool(failed) and follow.stop())
+        return replace(result, failed=failed, stopped=stopped)
 
 
 def save_grid(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
-from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
+from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
     Formats,
@@ -29,11 +29,13 @@ from cdpr_drake.analyses.frame.words import (
     one_of,
     words,
 )
+from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.grid_runs import (
     ARRAYS,
+    GridResult,
     grid_folder,
     grid_words,
     load_grid,
@@ -95,9 +97,6 @@ LEVERS_IN_WORDS = {
 }
 """What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
 
-RESULTS = "results.json"
-"""File of the numbers of a result."""
-
 Bounds: TypeAlias = Annotated[Path | str | PerturbationBounds | None, words(Path, "a file", "FILE")]
 Variations: TypeAlias = Annotated[
     Any,
@@ -107,45 +106,21 @@ Variations: TypeAlias = Annotated[
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Stability(Result):
+class Stability(GridResult):
     """Stability workspaces of one robot and scheme under one or several perturbation bounds.
 
     Attributes:
-        arguments: All that the arrays depend on.
-        grid: The poses.
         names: Names of the perturbation bounds, as in arguments["bounds"].
         stable: True if the servo is stable under each bounds, shape (b, k, nx, ny, nz).
         margin: Smallest eigenvalue of the symmetric part of Pi, as the verdict knows it, same
             shape [-]; minus infinity if Pi does not exist or nothing was proven.
         feasible: True if the platform can be held, shape (k, nx, ny, nz).
-        versions: Versions of what computed them.
-        robot: The robot; None if they were read from a file.
-        folder: The results folder; None if nothing is kept.
-        failed: Why figures were not written, by file.
-        stopped: True if figures are missing since the call was stopped.
     """
 
-    arguments: dict[str, Any]
-    grid: WorkspaceGrid
     names: tuple[str, ...]
     stable: np.ndarray
     margin: np.ndarray
     feasible: np.ndarray
-    versions: dict[str, str]
-    robot: Robot | None = None
-    folder: Path | None = None
-    failed: Mapping[str, str] = field(default_factory=dict)
-    stopped: bool = False
-
-    @property
-    def exit_code(self) -> int:
-        """130 if the call was stopped."""
-        return STOPPED if self.stopped else 0
-
-    @property
-    def geometry(self) -> str:
-        """Geometry of the cables in words, as `Robot.geometry_words`."""
-        return str(self.arguments.get("geometry", "geometry not recorded"))
 
     @property
     def interaction_matrix(self) -> str:
@@ -210,8 +185,7 @@ class Stability(Result):
             *(f"{kind}: {title}" for kind, title in KINDS.items()),
             f"cables: {self.geometry}",
             *([f"interaction matrix: {matrix}"] if matrix else []),
-            *(["stopped; the same call goes on"] if self.stopped else []),
-            *([] if self.folder is None else [f"results: {shown_path(self.folder)}"]),
+            *self.last_lines(),
         ]
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
@@ -233,33 +207,17 @@ class Stability(Result):
             columns[f"margin {name}"] = self.margin[k].reshape(-1)
         return columns
 
-    def to_dataframe(self) -> Any:
-        """The columns as a pandas DataFrame."""
-        import pandas as pd  # half a second, which few need
-
-        return pd.DataFrame(self.columns())
-
     def save(self, folder: Folder) -> None:
         """Writes `workspace.npz`."""
         about = {"arguments": self.arguments, "versions": self.versions, "bounds": self.names}
         names = ("stable", "margin", "feasible")
         save_grid(folder, about, self.grid, {name: getattr(self, name) for name in names})
 
-    def write(
-        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
-    ) -> dict[str, str]:
-        """Writes numbers, figures and the page; the grid's arrays by `save`.
-
-        Returns:
-            Why figures were not written, by file.
-        """
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """What writes the page for the browser, and what should be known of it."""
         from cdpr_drake.analyses.workspaces.workspace_scene import stability_page
 
-        folder.write_json(RESULTS, self.as_dict())
-        page, note = ({}, "") if self.robot is None else stability_page(self, self.robot)
-        if note:
-            follow.say(f"note: {note}")
-        return folder.write_all(figure_writers(self.figures(), formats) | page, follow.stop)
+        return stability_page(self, robot)
 
 
 def load_stability(path: Path | str) -> Stability:
@@ -371,14 +329,7 @@ def assess_stability(
             result = _assembled(arguments, poses, named, arrays)
             if results is not None:
                 result.save(results)
-        result = replace(result, robot=loaded)
-        if results is None:
-            return result
-        result = replace(result, folder=results.path)
-        failed = result.write(results, formats, follow)
-        if not failed:
-            results.complete()
-        return replace(result, failed=failed, stopped=bool(failed) and follow.stop())
+        return replace(result, robot=loaded).written(results, formats, follow)
 
 
 def _variations(base: PerturbationBounds, name: str, vary: Any) -> dict[str, PerturbationBounds]:

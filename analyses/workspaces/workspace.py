@@ -261,14 +261,7 @@ def compute_workspace(
         if boxes_mesh is not None and result.boxes is not None:
             with whole_file(Path(boxes_mesh)) as part:
                 write_boxes(result.boxes, part)
-        if results is None:
-            return result
-        result = replace(result, folder=results.path)
-        failed = result.write(results, formats, follow)
-        if not (failed or result.stopped):
-            results.complete()
-        stopped = result.stopped or (bool(failed) and follow.stop())
-        return replace(result, failed=failed, stopped=stopped)
+        return result.written(results, formats, follow)
 
 
 def _each(words: str | Sequence[str]) -> tuple[str, ...]:
@@ -421,8 +414,9 @@ def _on_grid(
     arrays = run_grid({ITEMS: work}, grid.size, chunk, folder, workers, follow)[ITEMS]
     shaped = {name: array.reshape(grid.shape) for name, array in arrays.items()}
     result = Workspace(
-        arguments, grid, {name: shaped[name] for name in kinds},
-        {name: shaped[name] for name in measures}, package_versions(),
+        arguments=arguments, grid=grid, versions=package_versions(),
+        holds={name: shaped[name] for name in kinds},
+        values={name: shaped[name] for name in measures},
     )  # fmt: skip
     if folder is not None:
         result.save(folder)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,10 +13,9 @@ import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
-from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
+from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.box_certificates import (
     BoxSearch,
     RefinedBoxes,
@@ -35,6 +34,7 @@ from cdpr_drake.analyses.workspaces.conditions import (
     WORST,
 )
 from cdpr_drake.analyses.workspaces.grid_runs import (
+    GridResult,
     grid_words,
     load_grid,
     region_numbers,
@@ -51,16 +51,12 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
-from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-
-RESULTS = "results.json"
-"""File of the numbers of a result."""
 
 CONTRADICTION = 1
 """Exit code if a proof contradicts the grid or the hull."""
@@ -73,55 +69,36 @@ COMPARED = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
 """What boxes are compared with, in words."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Workspace(Result):
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Workspace(GridResult):
     """Where kinds hold on a grid, and measures there; with hull and boxes if they are computed.
 
     Attributes:
-        arguments: All that the arrays depend on.
-        grid: The poses.
         holds: By kind, shape (k, nx, ny, nz).
         values: By measure, same shape, in its unit.
-        versions: Versions of what computed them.
-        robot: The robot; None if the workspace was read from a file.
         hull: Its hull.
         bound: Where the rays of the hull end at the latest.
         boxes: Boxes proven inside or outside.
         search: What was cut into boxes.
         region: Lower and upper corner of the box given instead of the frame, shape (3,) each [m].
         refined: How boxes were cut further along a way.
-        folder: The results folder; None if nothing is kept.
-        failed: Why figures were not written, by file.
-        stopped: True if boxes or figures are missing since the call was stopped.
     """
 
-    arguments: dict[str, Any]
-    grid: WorkspaceGrid
     holds: dict[str, np.ndarray]
     values: dict[str, np.ndarray]
-    versions: dict[str, str]
-    robot: Robot | None = None
     hull: WorkspaceHull | None = None
     bound: HullBound | None = None
     boxes: CertifiedBoxes | None = None
     search: BoxSearch | None = None
     region: tuple[Array, Array] | None = None
     refined: RefinedBoxes | None = None
-    folder: Path | None = None
-    failed: Mapping[str, str] = field(default_factory=dict)
-    stopped: bool = False
 
     @property
     def exit_code(self) -> int:
         """1 if a proof contradicts the grid or the hull, 130 if the call was stopped."""
         if any(len(part.broken) for part in self.agreement.values()):
             return CONTRADICTION
-        return STOPPED if self.stopped else 0
-
-    @property
-    def geometry(self) -> str:
-        """Geometry of the cables in words, as `Robot.geometry_words`."""
-        return str(self.arguments.get("geometry", "geometry not recorded"))
+        return super().exit_code
 
     def inside(self, kind: str = ALL) -> np.ndarray:
         """Which poses belong to a kind, or to all of them, shape (k, nx, ny, nz)."""
@@ -266,9 +243,7 @@ class Workspace(Result):
                 often = ", ".join(f"{name} at {n}" for name, n in counted)
                 lines.append(f"{words} of the poses: {often or 'none'}")
         lines += [*self._hull_lines(), *self._box_lines()]
-        if self.stopped:
-            lines.append("stopped; the same call goes on")
-        return [*lines, *([] if self.folder is None else [f"results: {shown_path(self.folder)}"])]
+        return [*lines, *self.last_lines()]
 
     def _hull_lines(self) -> list[str]:
         if self.hull is None or self.bound is None:
@@ -344,12 +319,6 @@ class Workspace(Result):
         parts = {**self.holds, **self.values}
         return {**self.grid.columns(), **{name: part.reshape(-1) for name, part in parts.items()}}
 
-    def to_dataframe(self) -> Any:
-        """The columns as a pandas DataFrame."""
-        import pandas as pd  # half a second, which few need
-
-        return pd.DataFrame(self.columns())
-
     def save(self, folder: Folder) -> None:
         """Writes `workspace.npz`."""
         arrays = {
@@ -362,7 +331,7 @@ class Workspace(Result):
     def write(
         self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
     ) -> dict[str, str]:
-        """Writes numbers, hull, boxes, figures and the page; the grid's arrays by `save`.
+        """Writes hull, boxes, numbers, figures and the page; the grid's arrays by `save`.
 
         Returns:
             Why figures were not written, by file.
@@ -371,16 +340,13 @@ class Workspace(Result):
             save_hull(self.hull, folder)
         if self.boxes is not None:
             save_boxes(self.boxes, folder)
-        folder.write_json(RESULTS, self.as_dict())
-        page, note = self._page()
-        if note:
-            follow.say(f"note: {note}")
-        return folder.write_all(figure_writers(self.figures(), formats) | page, follow.stop)
+        return super().write(folder, formats, follow)
 
-    def _page(self) -> tuple[Pictures, str]:
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """What writes the page for the browser, and what should be known of it."""
         from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 
-        return ({}, "") if self.robot is None else workspace_page(self, self.robot)
+        return workspace_page(self, robot)
 
 
 def load_workspace(path: Path | str) -> Workspace:
@@ -394,4 +360,7 @@ def load_workspace(path: Path | str) -> Workspace:
     for key, array in arrays.items():
         group, _, name = key.partition("/")
         groups[group][name] = array
-    return Workspace(about["arguments"], grid, groups["kind"], groups["measure"], about["versions"])
+    return Workspace(
+        arguments=about["arguments"], grid=grid, versions=about["versions"],
+        holds=groups["kind"], values=groups["measure"],
+    )  # fmt: skip

@@ -31,6 +31,8 @@ def with_options(message: str, options: Mapping[str, str]) -> str:
         message: Of one or more lines.
         options: Options by the words for arguments.
     """
+    if not options:
+        return message
     return "\n".join(_line_with_options(line, options) for line in message.split("\n"))
 
 

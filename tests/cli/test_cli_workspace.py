@@ -34,17 +34,6 @@ ONE = ("--workers", "1")
 PLANAR = ("workspace", "planar", "--grid", "5,5,1", *ONE)
 
 
-@pytest.mark.usefixtures("no_room_for_pictures")
-def test_pictures_that_fail_cost_nothing_else(capsys, here):
-    code, _, err = run(capsys, *PLANAR, "--out", "found")
-    assert code == 3
-    for name in ("planes.png", "workspace.html"):
-        assert f"{name}: not written: " in err
-    assert "No space left on device" in err
-    assert json.loads((here / "found" / "results.json").read_text())
-    assert not [path for path in here.rglob("*") if path.suffix in (".png", ".html")]
-
-
 def test_kinds_measures_and_hull_of_one_robot(capsys, here):
     out = here / "found"
     asked = (
@@ -92,32 +81,6 @@ def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(capsys, here):
             assert agreeing["contradictions"] == 0
             assert agreeing["in_boxes_proven_inside"] + agreeing["in_boxes_proven_outside"] > 0
     assert shares["all"] < shares["any"]
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_dynamic_and_closure_kinds(capsys):
-    kinds = "dynamic,wrench-closure,singularity-free,collision-free,static"
-    asked = (
-        "workspace", "acrobot_fully_constrained", "--kind", kinds, "--acceleration", "0.5,1",
-        "--velocity", "0,0,1", "--grid", "5,5,3", *ONE, "--limits", "0.5,60",
-    )  # fmt: skip
-    found = told(capsys, *asked)["workspaces"]
-    assert found["dynamic"]["poses"] <= found["static"]["poses"]
-    assert set(found) == {*kinds.split(","), "all"}
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_files_of_wrenches_and_obstacles(capsys, here):
-    (here / "wrenches.yaml").write_text("vertices: [[0, 0, 0, 5, 0, 0], [0, 0, 0, -5, 0, 0]]\n")
-    boxes = "boxes:\n  - {pose: {position: [0.2, 0.2, 0.3]}, size: [0.2, 0.2, 0.2]}\n"
-    (here / "boxes.yaml").write_text(boxes)
-    found = told(
-        capsys, "workspace", "planar", "--grid", "9,9,1", *ONE, "--kind",
-        "wrench-feasible,collision-free", "--wrench-set", "wrenches.yaml",
-        "--obstacles", "boxes.yaml",
-    )["workspaces"]  # fmt: skip
-    assert 0 < found["collision-free"]["poses"] < 81
-    assert 0 < found["wrench-feasible"]["poses"] < 81
 
 
 @pytest.mark.parametrize(("robot", "pose"), [("acrobot_large", "0,0,0.3"), ("planar", "0.1,0,0.3")])

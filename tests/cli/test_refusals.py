@@ -252,14 +252,14 @@ REFUSED = {
         ("planar --vary r_A=x", "--vary"),
         ("planar --bounds nothing.yaml", "nothing.yaml", "no such file"),
         ("planar --orientation 1,2", "--orientation", "phi,theta,psi"),
-        ("planar --workers 0", "--workers", "at least 1"),
+        ("planar --workers 0", "--workers", "1 to 4096"),
         ("acrobot_large --scenario acrobot_moving_tag", "target.motion", "rests"),
         ("planar --draws 0", "draws", "at least 1"),
         ("planar --searches -1", "searches", "found -1", "at least 1"),
         ("planar --pieces 0", "pieces", "found 0", "at least 1"),
         ("planar --verdict guessed", "verdict", "sampled"),
-        (f"planar --scheduler {NOBODY}", NOBODY, "this machine"),
-        ("acrobot_large --grid 2,2,2 --out there --format pgn", BAD_FORMAT),
+        (f"planar --workers {NOBODY}", NOBODY, "does not answer"),
+        ("acrobot_large --grid 2,2,2 --out there --figure-format pgn", "--figure-format", "'pgn'"),
     ],
     "study": [
         *((f"{name} --quick --scheduler {NOBODY}", NOBODY)
@@ -334,7 +334,8 @@ def held(root):
 @pytest.mark.parametrize(("line", "words"), ROWS, ids=[line[:70] for line, _ in ROWS])
 def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    for module in ("analyses.sweeps.workers", "analyses.frame.cluster"):
+        monkeypatch.setattr(f"cdpr_drake.{module}.SCHEDULER_TIMEOUT", 0.3)
     before = held(folder)
     said = refuse(capsys, *shlex.split(line))
     for word in words:

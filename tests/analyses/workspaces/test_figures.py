@@ -280,24 +280,6 @@ def test_planes_paint_the_grid_and_nothing_beside(measure, counts):
                 assert column.max() == pytest.approx(upper[k])
 
 
-@pytest.mark.parametrize("measure", [None, "capacity-margin"])
-def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
-    robot = load_robot("acrobot_large")
-    figure = planes_figure(small_workspace("acrobot_large"), measure)
-    assert figure_faults(figure) == []
-    axes = figure.axes[0]
-    drawn = {line.get_label(): np.array(line.get_data()) for line in axes.lines}
-    np.testing.assert_array_equal(drawn["exit points of the cables"], robot.exit_points()[:2])
-    np.testing.assert_allclose(drawn["frame"].min(axis=1), robot.frame.lower[:2])
-    np.testing.assert_allclose(drawn["box of the grid"].max(axis=1), [0.3, 0.2])
-    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
-    for points in drawn.values():
-        assert np.all(low < points.T)
-        assert np.all(high > points.T)
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {*drawn} <= {*told}
-
-
 def test_planes_of_a_measure_say_where_there_is_no_number():
     """A plane without a pose inside was an empty panel."""
     workspace = small_workspace("acrobot_large")
