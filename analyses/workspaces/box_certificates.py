@@ -94,10 +94,10 @@ def box_search(
         WorkspaceError: A kind cannot be proven, or the conditions have a method of tensions, of
             which a proof says nothing.
     """
-    known = [kind.value for kind in CertifiedKind]
-    if not set(kinds) <= set(known):
+    provable = [kind.value for kind in CertifiedKind]
+    if not set(kinds) <= set(provable):
         raise WorkspaceError(
-            f"certify: found kinds {','.join(kinds)}; accepted: {', '.join(known)}"
+            f"certify: found kinds {','.join(kinds)}; accepted: {', '.join(provable)}"
         )
     if np.any(about.case.cables.arm > 0.0):
         raise WorkspaceError(
@@ -147,10 +147,10 @@ def certified_boxes(
         WorkspaceError: most_boxes < 1.
         OutputFolderError: The folder cannot be written.
     """
-    with _journal(folder, JOURNAL, search, search.arguments()) as (known, keep):
+    with _journal(folder, JOURNAL, search, search.arguments()) as (earlier, keep):
         return certify(
             search.tasks, search.box, most_boxes, on_progress=on_progress,
-            should_stop=should_stop, known=known, on_journal=keep,
+            should_stop=should_stop, known=earlier, on_journal=keep,
         )  # fmt: skip
 
 
@@ -222,10 +222,10 @@ def refined_boxes(
             f"in x, y, z from {search.box.lower[:3]} to {search.box.upper[:3]} m"
         )
     arguments = search.arguments() | plain({"tube": tube, "boxes": int(boxes.curve[-1, 0])})
-    with _journal(folder, REFINED_JOURNAL, search, arguments) as (known, keep):
+    with _journal(folder, REFINED_JOURNAL, search, arguments) as (earlier, keep):
         finer = refine(
             boxes, search.tasks, tube, most_boxes, on_progress=on_progress,
-            should_stop=should_stop, known=known, on_journal=keep,
+            should_stop=should_stop, known=earlier, on_journal=keep,
         )  # fmt: skip
     judged = int(finer.curve[-1, 0] - boxes.curve[-1, 0])
     return RefinedBoxes(finer, tube, _open_share(boxes, tube), _open_share(finer, tube), judged)
@@ -243,10 +243,10 @@ def _journal(
 ) -> Iterator[tuple[BoxJournal | None, Callable[[BoxJournal], None]]]:
     """What an earlier search of the same had judged, and what keeps a journal now and then."""
     words = json.dumps(arguments, sort_keys=True)
-    known, last, saved = None, None, time.monotonic()
+    earlier, last, saved = None, None, time.monotonic()
     stored = None if folder is None else load_arrays(folder.path / name)
     if stored is not None and str(stored["about"]) == words:
-        known = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
+        earlier = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
 
     def save() -> None:
         if last is not None and folder is not None:
@@ -262,7 +262,7 @@ def _journal(
             save()
             saved = time.monotonic()
 
-    yield known, keep
+    yield earlier, keep
     save()
 
 

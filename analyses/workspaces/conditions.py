@@ -229,11 +229,11 @@ def _far(about: PoseConditions, at: Poses, parts: slice) -> np.ndarray:
 def _visible(about: PoseConditions, at: Poses) -> np.ndarray:
     view = about.view
     assert view is not None
-    seen = []
+    visible = []
     for p, R in zip(at.positions, at.rotations, strict=True):
         X_WC = RigidTransform(RotationMatrix(R), p) @ view.X_PC
-        seen.append(view.target.in_view(X_WC.inverse() @ view.X_WO, view.pinhole))
-    return np.array(seen, bool)
+        visible.append(view.target.in_view(X_WC.inverse() @ view.X_WO, view.pinhole))
+    return np.array(visible, bool)
 
 
 def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
@@ -293,8 +293,8 @@ def _capacity(about: PoseConditions, at: Poses) -> Array:
 
 
 def _frequency(about: PoseConditions, at: Poses) -> Array:
-    found = stiffness_at(about.case, at.positions, at.rotations)
-    return first_frequencies(found, about.case, about.body, at.rotations)
+    stiffness = stiffness_at(about.case, at.positions, at.rotations)
+    return first_frequencies(stiffness, about.case, about.body, at.rotations)
 
 
 def _clearance(about: PoseConditions, at: Poses) -> Array:

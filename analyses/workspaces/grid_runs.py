@@ -119,8 +119,8 @@ def run_grid(
         counter.add(job[2] - job[1], job[0])
     if counter.done < total:
         words = f"stopped after {counter.done:.0f} of {total} {ITEMS}"
-        kept = "" if folder is None else f"; the same command goes on in {folder.path}"
-        raise StoppedError(words + kept)
+        words += "" if folder is None else f"; the same command goes on in {folder.path}"
+        raise StoppedError(words)
     return {
         name: {key: np.concatenate([chunks[job][key] for job in mine]) for key in chunks[mine[0]]}
         for name in parts

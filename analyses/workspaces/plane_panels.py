@@ -150,10 +150,10 @@ def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
         which: Numbers of the axes.
     """
     steps = [float(np.ptp(axes[k])) / max(len(axes[k]) - 1, 1) for k in which]
-    other = max(steps) or ONE_CELL
+    widest = max(steps) or ONE_CELL
     borders = []
     for k, step in zip(which, steps, strict=True):
-        edges = axes[k][0] + (step or other) * (np.arange(len(axes[k]) + 1) - 0.5)
+        edges = axes[k][0] + (step or widest) * (np.arange(len(axes[k]) + 1) - 0.5)
         if step > 0.0:
             edges[[0, -1]] = axes[k][[0, -1]]
         borders.append(edges)

@@ -199,12 +199,12 @@ def plain(value: Any) -> Any:
             names.append("arm")
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
-        found = {
+        content = {
             field.name: plain(getattr(value, field.name))
             for field in fields(value)
             if not field.metadata.get(ONLY_GIVEN, False) or getattr(value, field.name)
         }
-        return {"kind": type(value).__name__, **found}
+        return {"kind": type(value).__name__, **content}
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -176,8 +176,8 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
     name = parameter.removesuffix(DEGREES)
     angle = name.startswith("d_theta")
     if name not in BOUNDS or (parameter != name and not angle):
-        known = [one for r in BOUNDS for one in ((r, r + DEGREES) if "theta" in r else (r,))]
-        raise StabilityError(f"bound {parameter!r} is unknown; {closest(parameter, known)}")
+        names = [name for r in BOUNDS for name in ((r, r + DEGREES) if "theta" in r else (r,))]
+        raise StabilityError(f"bound {parameter!r} is unknown; {closest(parameter, names)}")
     if parameter != name:
         if not 0.0 <= value <= 180.0:
             raise StabilityError(f"{parameter}: found {value:g}; accepted: 0 <= angle <= 180 [deg]")

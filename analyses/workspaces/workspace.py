@@ -270,12 +270,12 @@ def _each(words: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _check_names(kinds: Sequence[str], measures: Sequence[str], rule: str) -> None:
-    for argument, given, known in (
+    for argument, values, table in (
         ("kinds", kinds, KINDS), ("measures", measures, MEASURES), ("orientations", [rule], RULES),
     ):  # fmt: skip
-        for name in given:
-            if name not in known:
-                raise WorkspaceError(f"{argument} {name!r} is unknown; {closest(name, known)}")
+        for name in values:
+            if name not in table:
+                raise WorkspaceError(f"{argument} {name!r} is unknown; {closest(name, table)}")
     if not kinds:
         raise WorkspaceError(f"kinds: found none; accepted: {', '.join(KINDS)}")
 

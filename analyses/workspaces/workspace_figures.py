@@ -108,8 +108,8 @@ def _measure_figure(workspace: Workspace, measure: str) -> Figure:
     inside = workspace.inside()
     # With no pose inside there is nothing else to see; the title says so.
     values = _least(workspace.values[measure], inside if inside.any() else np.ones_like(inside))
-    known = values[np.isfinite(values)]
-    limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
+    finite = values[np.isfinite(values)]
+    limits = (float(np.min(finite)), float(np.max(finite))) if len(finite) else (0.0, 1.0)
     # A plane without a number would be an empty panel.
     colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
     points = [workspace.grid.axes[k] for k in plane_axes(workspace.grid.shape[1:])[1:]]
@@ -215,24 +215,24 @@ def _breaks_title(workspace: Workspace) -> str:
     )
 
 
-def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
+def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
     """Shares that are proven, and what is open, against the number of boxes.
 
     Args:
-        found: The boxes.
+        boxes: The boxes.
         robot: Name of the robot.
         cables: How its cables run, in words; empty: nothing is said.
     """
     words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
     figure, axes = new_figure(
-        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{found.open:.2%} of the box open"
+        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{boxes.open:.2%} of the box open"
     )
     names = ("proven inside", "proven outside", "open")
-    for number, (name, share) in enumerate(zip(names, found.curve[:, 1:].T, strict=True)):
+    for number, (name, share) in enumerate(zip(names, boxes.curve[:, 1:].T, strict=True)):
         look = nth_look(number)
         shown = share > 0.0  # on a logarithmic axis
         axes.plot(
-            found.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
+            boxes.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
             marker=look.marker, markersize=4,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
@@ -240,18 +240,18 @@ def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
     return figure
 
 
-def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
+def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
     """What is proven in three planes through the middle of the region that was cut.
 
     Angles that vary are in the middle of their ranges.
 
     Args:
-        found: The boxes.
+        boxes: The boxes.
         robot: Name of the robot.
         kinds: What was proven.
     """
-    low = np.min(found.poses - found.halves, axis=0)
-    high = np.max(found.poses + found.halves, axis=0)
+    low = np.min(boxes.poses - boxes.halves, axis=0)
+    high = np.max(boxes.poses + boxes.halves, axis=0)
     middle = 0.5 * (low + high)
     wide = [k for k in range(3) if low[k] < high[k]]
     planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
@@ -261,12 +261,12 @@ def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
     at = middle + 1e-6 * (high - low)
     for axes, normal in zip(np.ravel(grid), planes, strict=True):
         u, v = (k for k in range(3) if k != normal)
-        others = [k for k in range(found.poses.shape[1]) if k not in (u, v)]
-        hit = np.all(np.abs(found.poses - at)[:, others] <= found.halves[:, others] + 1e-12, axis=1)
+        others = [k for k in range(boxes.poses.shape[1]) if k not in (u, v)]
+        hit = np.all(np.abs(boxes.poses - at)[:, others] <= boxes.halves[:, others] + 1e-12, axis=1)
         for verdict, (_, color, hatch) in PROVEN.items():
-            some = np.flatnonzero(hit & (found.verdicts == verdict))
-            corners = (found.poses - found.halves)[some][:, (u, v)]
-            sizes = 2.0 * found.halves[some][:, (u, v)]
+            numbers = np.flatnonzero(hit & (boxes.verdicts == verdict))
+            corners = (boxes.poses - boxes.halves)[numbers][:, (u, v)]
+            sizes = 2.0 * boxes.halves[numbers][:, (u, v)]
             cells = corners[:, np.newaxis] + sizes[:, np.newaxis] * SQUARE
             axes.add_collection(
                 PolyCollection(
@@ -290,15 +290,14 @@ def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
 
 def _least(values: Array, inside: np.ndarray) -> Array:
     """Least value over the orientations where all holds; NaN where none does."""
-    some = np.where(inside & np.isfinite(values), values, np.inf)
-    least = np.min(some, axis=0)
+    least = np.min(np.where(inside & np.isfinite(values), values, np.inf), axis=0)
     return np.where(np.isfinite(least), least, np.nan)
 
 
 def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:
-    known = plane[np.isfinite(plane)]
+    finite = plane[np.isfinite(plane)]
     levels = MaxNLocator(CONTOURS).tick_values(*limits)
-    if len(known) == 0 or not np.any((levels > known.min()) & (levels < known.max())):
+    if len(finite) == 0 or not np.any((levels > finite.min()) & (levels < finite.max())):
         return
     lines = axes.contour(
         *along, np.ma.masked_invalid(plane), levels, colors="black", linewidths=0.6
@@ -319,15 +318,15 @@ def _title(workspace: Workspace, measure: str | None) -> str:
     return "\n".join(words) + f"\n{share}{rule}"
 
 
-def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure:
+def wrench_set_figure(wrenches: AvailableWrenches, at: Array, title: str) -> Figure:
     """Sections through what cables can give: forces at the moments of `at`, and the other way.
 
     Args:
-        found: The wrenches, of six rows or of those of a planar platform, (moment, f_x, f_y).
+        wrenches: The wrenches, of six rows or of those of a planar platform, (moment, f_x, f_y).
         at: A wrench W t that is marked, such as what the weight demands, shape (n,) [N m, N].
         title: Title of the figure.
     """
-    if len(found.row_scale) == 6:
+    if len(wrenches.row_scale) == 6:
         panels = [(3, 4), (3, 5), (4, 5), (0, 1), (0, 2), (1, 2)]
         names = ["m_x", "m_y", "m_z", "f_x", "f_y", "f_z"]
     else:
@@ -335,7 +334,7 @@ def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure
     units = [f"${name}$ [{'N m' if name[0] == 'm' else 'N'}]" for name in names]
     figure, grid = new_figure(-(-len(panels) // 3), 3, (11.0, 4.2 * -(-len(panels) // 3)), title)
     for axes, rows in zip(np.ravel(grid), panels, strict=True):
-        corners = found.section(rows, at)
+        corners = wrenches.section(rows, at)
         if len(corners):
             axes.fill(*corners.T, facecolor=INSIDE, alpha=0.35, edgecolor=INSIDE, linewidth=1.5)
         axes.plot(at[rows[0]], at[rows[1]], "k+", markersize=10)

@@ -28,8 +28,8 @@ LONG_WORK = {
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],
     "view": ["cdpr_drake.cli.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
-    "workspace": [SESSION],
-    "stability": [SESSION],
+    "workspace": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
+    "stability": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
     "plan": [
         "cdpr_drake.analyses.front.planning.solve_free_motion",
         "cdpr_drake.analyses.front.proven_motions.ProvenSets.find",
