@@ -19,8 +19,6 @@ from .analyses.front.simulated_fits import identify_in_simulation as identify_in
 from .analyses.front.simulation import continue_run as continue_run
 from .analyses.front.simulation import finish_run as finish_run
 from .analyses.front.simulation import simulate as simulate
-from .analyses.front.stability import assess_stability as assess_stability
-from .analyses.front.workspaces import compute_workspace as compute_workspace
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics
@@ -28,6 +26,7 @@ from .analyses.logs.log_request import LogRequest as LogRequest
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
+from .analyses.simulation.stability_files import assess_run as assess_run
 from .analyses.statics.static import solve_static as solve_static
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case
@@ -38,6 +37,8 @@ from .analyses.studies.study import studies as studies
 from .analyses.tensions import TENSION_METHODS as TENSION_METHODS
 from .analyses.tensions import solve_tensions as solve_tensions
 from .analyses.view import view as view
+from .analyses.workspaces.stability import assess_stability as assess_stability
+from .analyses.workspaces.workspace import compute_workspace as compute_workspace
 from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError

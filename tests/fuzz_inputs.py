@@ -37,7 +37,7 @@ import cdpr_drake
 from cdpr_drake.analyses import installation, view
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies.study import STUDIES, Study
-from cdpr_drake.analyses.workspaces import stability_figures
+from cdpr_drake.analyses.workspaces.stability import Stability
 from cdpr_drake.cli import app
 from cdpr_drake.models import camera_catalogue, sensor_catalogue
 from tests.fuzz_cases import COMMANDS as GOOD
@@ -86,10 +86,7 @@ def load_all() -> None:
                     import_module(".".join(("cdpr_drake", *words)).removesuffix(".__init__"))
 
 
-PICTURES = (
-    (simulation, "write_pictures"),
-    (stability_figures, "stability_pictures"),
-)
+PICTURES = ((simulation, "write_pictures"), (Stability, "figures"))
 """What draws figures, by the module in which it is looked up."""
 
 

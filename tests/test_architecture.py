@@ -54,6 +54,8 @@ class Module(NamedTuple):
 
     imports: list[tuple[str, str]]
     """From this project as (module, name), wherever in the file they stand."""
+    typed: set[tuple[str, str]]
+    """Those of them that stand under TYPE_CHECKING."""
     defined: set[str]
     """Names."""
     postponed: bool
@@ -71,6 +73,10 @@ def read(name):
     origins = [(node.module or "", alias.name) for node in nodes
                if isinstance(node, ast.ImportFrom) for alias in node.names]  # fmt: skip
     imports = [(module, what) for module, what in origins if module.startswith("cdpr_drake")]
+    guards = [node for node in nodes if isinstance(node, ast.If)]
+    checked = [node for node in guards if ast.unparse(node.test) == "TYPE_CHECKING"]
+    typed = {(node.module or "", alias.name) for part in checked for node in ast.walk(part)
+             if isinstance(node, ast.ImportFrom) for alias in node.names}  # fmt: skip
     fields = {what for module, what in imports if module == "cdpr_drake.schema.fields"}
     values = [node.value for node in nodes if isinstance(node, ast.AnnAssign)]
     named = {f"{module}.{what}" for module, what in origins}
@@ -82,6 +88,7 @@ def read(name):
             named.add(node.id)
     return Module(
         imports,
+        typed,
         bound_names(tree.body),
         ("__future__", "annotations") in origins,
         any(isinstance(value, ast.Call) and getattr(value.func, "id", None) in fields
@@ -137,12 +144,14 @@ def test_no_public_name_is_a_module_of_its_room(name):
 
 
 def test_files_have_no_circles():
-    """Imports under TYPE_CHECKING and inside functions count; the sorter raises CycleError."""
+    """Imports inside functions count, those for types alone do not: a result draws itself by
+    functions that take it. The sorter raises CycleError."""
     graph = {}
     for name in FILES:
         needs = set()
         for module, what in read(name).imports:
-            needs.add(f"{module}.{what}" if f"{module}.{what}" in FILES else module)
+            if (module, what) not in read(name).typed:
+                needs.add(f"{module}.{what}" if f"{module}.{what}" in FILES else module)
         graph[name] = needs - {name}
     assert len(list(TopologicalSorter(graph).static_order())) == len(FILES)
 

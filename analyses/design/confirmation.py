@@ -10,11 +10,7 @@ import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS, GoalContext, can_close, servo_stable
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceRequest,
-    interference_bodies,
-    make_workspace_question,
-)
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
 
@@ -120,12 +116,10 @@ def confirm(
             continue
         if say is not None:
             say(f"proving {kind} of {robot.name}")
-        request = WorkspaceRequest(
-            required=judging.required if kind in RESISTING else None,
-            around=interference_bodies(robot),
-        )
-        question = make_workspace_question(name, [kind], judging.grid, asked=request)
-        proof = certified_boxes(box_search(question, robot), boxes, should_stop=should_stop)
+        required = judging.required if kind in RESISTING else None
+        about = pose_conditions(robot, required=required)
+        search = box_search(robot, about, [kind], judging.grid.angles)
+        proof = certified_boxes(search, boxes, should_stop=should_stop)
         size = robot.frame.upper - robot.frame.lower
         volume = float(np.prod(size[:2] if robot.is_planar() else size))
         volumes.append(proof.inside * volume)

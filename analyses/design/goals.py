@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, ConditionsTask
-from cdpr_drake.analyses.workspaces.stability_question import stability_case
-from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, conditions_at
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
+from cdpr_drake.analyses.workspaces.servo_stability import stability_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import CdprError, DesignError
@@ -73,10 +73,9 @@ class Goal:
 
 def _arrays(robot: Robot, judging: GoalContext, name: str) -> Array:
     """A kind (as 0 and 1) or measure at all poses of the grid."""
-    about = pose_conditions(robot, WorkspaceRequest(required=judging.required))
-    kinds, measures = ((name,), ()) if name in KINDS else ((), (name,))
-    task = ConditionsTask(about, judging.grid, kinds, measures)
-    return np.asarray(task(0, judging.grid.size)[name], float)
+    about = pose_conditions(robot, required=judging.required)
+    arrays = conditions_at(about, judging.grid, [name], 0, judging.grid.size)
+    return np.asarray(arrays[name], float)
 
 
 def _share(name: str) -> Value:

@@ -39,7 +39,7 @@ from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, WrenchSetError, accepted_names

@@ -19,7 +19,7 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.goals import GoalContext
-from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceRequest, pose_conditions
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
@@ -187,7 +187,7 @@ def _capacity_margin(
     candidates: Candidates, number: int, coordinates: Array, judging: GoalContext
 ) -> tuple[Array, Array]:
     robot, grid = candidates.robot(number, coordinates), judging.grid
-    about = pose_conditions(robot, WorkspaceRequest(required=judging.required))
+    about = pose_conditions(robot, required=judging.required)
     positions, rotations = grid.positions(0, grid.size), grid.rotations(0, grid.size)
     demand = resisting(about.case, about.required or SpatialSet(), rotations)
     slopes = margin_slopes(about.case, positions, rotations, demand)

@@ -11,12 +11,15 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
@@ -174,6 +177,11 @@ class Folder:
         """Writes numbers and words for other programs; all numbers are finite."""
         self.write_text(name, json.dumps(value, indent=2, allow_nan=False) + "\n")
 
+    def write_arrays(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Writes arrays by name."""
+        with self.file(name) as part, part.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
     def write_all(
         self,
         writers: Mapping[str, Callable[[Path], object]],
@@ -229,6 +237,15 @@ class Folder:
         part.write_text(words + "\n", encoding="utf-8")
         _sync(part)
         part.replace(self.path / MARKER)
+
+
+def load_arrays(path: Path) -> dict[str, np.ndarray] | None:
+    """Reads what `Folder.write_arrays` wrote; None if it is not there or damaged."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
+            return {key: stored[key] for key in stored.files}
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error):
+        return None
 
 
 def read_marker(folder: Path) -> dict[str, Any] | None:

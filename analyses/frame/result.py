@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 WIDTH = 120
 """Of a result in a program without a terminal [characters]."""
 
+STOPPED = 130
+"""Exit code of a command that was stopped."""
+
 
 @dataclass(frozen=True)
 class Table:

@@ -52,7 +52,7 @@ def words(
     convert.many = many  # type: ignore[attr-defined]
     return Parameter(
         name=name, converter=convert, n_tokens=1, metavar=metavar, completer=completer,
-        json_list=False, json_dict=False, negative=(),
+        accepts_keys=False, json_list=False, json_dict=False, negative=(),
     )  # fmt: skip
 
 
@@ -225,6 +225,8 @@ def refuse_arguments(why: str, **arguments: object) -> None:
     names = ", ".join(name for name, value in arguments.items() if value is not None)
     if names:
         raise CdprError(f"{names}: {why}")
+
+
 def _in_range(
     kind: Callable[[str], Any], low: float, high: float | None, what: str, metavar: str,
     name: str | None = None,
@@ -305,6 +307,8 @@ OpenedWord: TypeAlias = Annotated[
           completer=lambda context: _files("robot")(context) + _files("scenario")(context)),
 ]  # fmt: skip
 """What the studio opens."""
+
+
 class Word(str):
     """A word of a command line with its value, for results that tell what was asked.
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import Formats, OutFolder, words
 from cdpr_drake.analyses.reporting.left_folders import holds_log
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk
@@ -21,7 +25,7 @@ from cdpr_drake.analyses.visualization.curves import draw_curve, shade
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.errors import CdprError, OutputFolderError, why_not_read
 from cdpr_drake.palette import BOUND, DISTANCE, LOST, PLATFORM
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -71,27 +75,31 @@ NEEDED = ("time", "X_WP", "X_WP_estimated", "tensions", "slack")
 """Quantities of a log that tell how stable the servo was."""
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityOfFolder:
+@dataclass(frozen=True, eq=False, repr=False)
+class RunStability(Result):
     """Stability along the run of a folder.
 
     Attributes:
-        folder: The run's.
+        run: The run's folder.
         title: What the run was.
-        threshold: Tension from which a cable counted as taut [N]; None: one that was not slack.
-        along: What was found.
+        threshold: Tension from which a cable counts as taut [N]; None: one that was not slack.
+        along: Cables, rank and margin over time.
+        folder: Where it was written.
+        failed: Why figures were not written, by file.
     """
 
-    folder: Path
+    run: Path
     title: str
     threshold: float | None
     along: StabilityAlong
+    folder: Path
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Its numbers, for JSON."""
         along = self.along
-        found = {
-            "run": str(self.folder),
+        numbers: dict[str, Any] = finite({
+            "run": str(self.run),
             "threshold_n": self.threshold,
             "rows": len(along.time),
             "freedom": along.freedom,
@@ -100,51 +108,85 @@ class StabilityOfFolder:
             "underactuated_s": along.underactuated_time(),
             "least_stability_margin": along.least_margin(),
             "unstable_s": along.unstable_time(),
-        }
-        cleaned: dict[str, Any] = finite(found)
-        return cleaned
+        })  # fmt: skip
+        return numbers
 
-    def write(self, folder: Path, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
-        """Writes `stability.json`, `stability.npz`, then the figure into a folder that exists.
+    def tables(self) -> list[Table]:
+        """Least numbers of cables, rank and margin, and times."""
+        numbers = self.as_dict()
+        margin, taut = numbers["least_stability_margin"], numbers["taut_cables"]
+        return [Table(f"{self.run}: stability along the run", rows=[
+            ("cables that pull", f"at least {taut['min']}, {taut['end']} at the end"),
+            ("rank of the Jacobian", f"at least {numbers['least_jacobian_rank']}"),
+            (f"rank below {numbers['freedom']}", f"{numbers['underactuated_s']:.2f} s"),
+            ("least eigenvalue of sym(Pi)", "unknown" if margin is None else f"{margin:.3f}"),
+            ("not stable", f"{numbers['unstable_s']:.2f} s"),
+            ("results", str(self.folder)),
+        ])]  # fmt: skip
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """Cables that pull, rank and margin over time."""
+        title = f"Cables that pull, and stability of the servo\n{self.title}"
+        return {"stability": partial(stability_figure, title, self.along)}
+
+    def write(self, formats: Sequence[str] = DEFAULT_FORMATS) -> dict[str, str]:
+        """Writes `stability.json`, `stability.npz`, then the figure.
 
         Returns:
-            Of each figure that could not be written, the file and why, in one line.
+            Why figures were not written, by file.
+
+        Raises:
+            OutputFolderError: The folder cannot be written.
         """
         along = self.along
-        write_json(folder / "stability.json", self.as_dict())
-        with whole_file(folder / "stability.npz") as part:
-            np.savez_compressed(
-                part, time=along.time, taut_cables=along.taut,
-                jacobian_rank=along.rank, stability_margin=along.margin,
-            )  # fmt: skip
-        words = f"Cables that pull, and stability of the servo\n{self.title}"
-        return write_figures(
-            folder, {"stability": partial(stability_figure, words, along)}, formats
-        )
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_json(self.folder / "stability.json", self.as_dict())
+            with whole_file(self.folder / "stability.npz") as part:
+                np.savez_compressed(
+                    part, time=along.time, taut_cables=along.taut, jacobian_rank=along.rank,
+                    stability_margin=along.margin,
+                )  # fmt: skip
+            return write_figures(self.folder, self.figures(), formats)
+        except OSError as problem:
+            raise OutputFolderError(
+                f"{self.folder}: cannot be written: {why_not_read(problem)}"
+            ) from problem
 
 
-def stability_of_folder(folder: Path, threshold: float | None = None) -> StabilityOfFolder:
-    """The stability criterion along the run that a folder holds.
+@verb()
+def assess_run(
+    *, along: Annotated[Path, words(Path, "the folder of a run", "RUN", name="--along")],
+    threshold: float | None = None, folder: OutFolder = None, formats: Formats = DEFAULT_FORMATS,
+) -> RunStability:  # fmt: skip
+    """Judges the stability of a visual servo along a run, with slack cables left out.
 
     Args:
-        folder: A folder that `cdpr simulate` wrote, or what a killed run left.
-        threshold: Tension from which a cable counts as taut [N]; None: one that is not slack.
+        along: Folder that cdpr simulate wrote, or what a killed run left.
+        threshold: Tension from which a cable counts as taut [N]; default: one that is not slack.
+        folder: Folder of the results; default: the run's.
+        formats: Formats of the figure's files.
 
     Raises:
-        OutputFolderError: It holds no log of a visual servo.
+        OutputFolderError: The run's folder holds no log of a visual servo, or results cannot be
+            written.
         ScenarioError: Its scenario is not accepted.
     """
-    log = _needed(folder)
+    if threshold is not None and not (math.isfinite(threshold) and threshold >= 0.0):
+        raise CdprError(f"threshold: found {threshold:g}; accepted: >= 0 [N]")
+    run = Path(along)
+    log = _needed(run)
     # Only poses and tensions of the log count: nothing is rendered.
-    scenario = load_scenario(str(folder / "scenario.yaml"), ())
+    scenario = load_scenario(str(run / "scenario.yaml"), ())
     if not isinstance(scenario, Scenario):
         raise OutputFolderError(
-            f"{folder}: found a run of kind {scenario.kind}; accepted: one of a visual servo"
+            f"{run}: found a run of kind {scenario.kind}; accepted: one of a visual servo"
         )
     scenario.camera.kind = "projected"
-    along = stability_along(unfinished_run(scenario, log), threshold)
+    judged = stability_along(unfinished_run(scenario, log), threshold)
     title = f"{scenario.title}\n({scenario.name}, seed {scenario.seed})"
-    return StabilityOfFolder(folder, title, threshold, along)
+    result = RunStability(run, title, threshold, judged, run if folder is None else Path(folder))
+    return replace(result, failed=result.write(formats))
 
 
 def _needed(folder: Path) -> Log:

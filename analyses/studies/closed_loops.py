@@ -32,7 +32,7 @@ from cdpr_drake.analyses.studies.perturbed_servo import (
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.geometry.poses import (

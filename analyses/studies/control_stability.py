@@ -44,6 +44,8 @@ from cdpr_drake.analyses.studies.recipe_variants import (
 )
 from cdpr_drake.analyses.studies.stability_recipe import (
     RECIPE,
+    SampledTask,
+    VerdictsTask,
     recipe_bounds,
     recipe_case,
     recipe_grid,
@@ -60,7 +62,6 @@ from cdpr_drake.analyses.studies.stability_tables import (
     steps_of,
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
-from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask, VerdictsTask
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.stability.no_stable_target import stable_target_exists
 from cdpr_drake.stability.perturbation_bounds import DIRECTIONS, PerturbationBounds

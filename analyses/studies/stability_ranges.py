@@ -44,7 +44,7 @@ from cdpr_drake.analyses.studies.stability_recipe import (
     single_bounds,
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
-from cdpr_drake.analyses.workspaces.stability_question import PRINTED
+from cdpr_drake.analyses.workspaces.servo_stability import PRINTED
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles, pose_rows
 from cdpr_drake.stability.criterion_closed_forms import (

@@ -34,7 +34,7 @@ Source: servoing thesis 3.3 and A.5, for what it says.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -48,13 +48,13 @@ from cdpr_drake.analyses.studies.recipe_variants import (
     shipped_robot,
 )
 from cdpr_drake.analyses.studies.stability_tables import PublishedTable
+from cdpr_drake.analyses.workspaces.servo_stability import PRINTED
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
-from cdpr_drake.analyses.workspaces.stability_question import PRINTED
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.stability.desired_view import FixedPlace, OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import StabilityCase
-from cdpr_drake.stability.verdict import VerdictOptions
+from cdpr_drake.stability.verdict import VerdictOptions, judge_all_verdicts, judge_stability
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count, grid_by_step
 
 RECIPE = str(__doc__)
@@ -158,3 +158,37 @@ def single_bounds(
     if value < 0.0:
         raise StabilityError(f"{name}: found {value:g}; accepted: a number >= 0")
     return others.varied(**changes)
+
+
+@dataclass(frozen=True, eq=False)
+class SampledTask:
+    """Poses of a grid judged by samples.
+
+    Attributes:
+        case: Robot, scheme, target.
+        bounds: Bounds of the perturbations.
+        grid: The poses.
+        options: How hard to look.
+    """
+
+    case: StabilityCase
+    bounds: PerturbationBounds
+    grid: WorkspaceGrid
+    options: VerdictOptions
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Array `stable` of the poses start to stop, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        judged = judge_stability(self.case, self.bounds, poses, "sampled", self.options)
+        return {"stable": judged.stable}
+
+
+@dataclass(frozen=True, eq=False)
+class VerdictsTask(SampledTask):
+    """Poses of a grid judged by every verdict."""
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """For each verdict whether the poses start to stop are stable, shape (n,) bool."""
+        poses = self.grid.pose_rows(start, stop)
+        judged = judge_all_verdicts(self.case, self.bounds, poses, self.options)
+        return {verdict: chunk.stable for verdict, chunk in judged.items()}

@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from cdpr_drake.analyses.studies.rows import Row
 from cdpr_drake.analyses.studies.stability_recipe import (
     RECIPE,
+    SampledTask,
     recipe_bounds,
     recipe_case,
     recipe_grid,
@@ -29,8 +30,7 @@ from cdpr_drake.analyses.studies.stability_tables import BASELINE_VALUES, BY_NAM
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
-from cdpr_drake.analyses.workspaces.stability_question import PRINTED
-from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
+from cdpr_drake.analyses.workspaces.servo_stability import PRINTED
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import DESIRED, IDEAL, PLATFORM, WORKSPACES, nth_look

@@ -6,7 +6,6 @@ Source: servoing thesis 1.3.3, figures 1.17 and 1.18; Gazebo thesis 2.6.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -19,12 +18,12 @@ from matplotlib.lines import Line2D
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.visualization.figure_style import bar_style, bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
-from cdpr_drake.analyses.workspaces.conditions import OF_POSES
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceQuestion,
-    WorkspaceRequest,
-    make_workspace_question,
+from cdpr_drake.analyses.workspaces.conditions import (
+    OF_POSES,
+    PoseConditions,
+    conditions_at,
 )
+from cdpr_drake.analyses.workspaces.robot_conditions import grid_conditions, pose_conditions
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -122,9 +121,9 @@ def static_row(name: str, limits: tuple[float, float], step: float) -> dict[str,
     frame = load_robot(name).frame
     cells = (frame.upper - frame.lower) / step
     counts = [2 * round(float(n) / 2.0) + 1 for n in cells]  # odd: every second has both ends
-    request = WorkspaceRequest(limits=limits, pulleys=False)
-    question = make_workspace_question(name, ["static"], frame_grid(name, counts), asked=request)
-    row, axes = poses_row(question), question.grid.axes
+    about = pose_conditions(load_robot(name), limits=limits, pulleys=False)
+    grid = frame_grid(name, counts)
+    row, axes = poses_row(about, grid, ["static"]), grid.axes
     inside = row["holds_static"]
     volume = workspace_volume(inside, axes, VolumeRule.CORNERS)
     x, y, z = (axis[::2] for axis in axes)
@@ -149,15 +148,16 @@ def kinds_row(name: str, counts: Sequence[int]) -> dict[str, Any]:
         asked for; pose_shares, frame_shares, pose_shares_of_pairs: shares of kinds, and of two of
         them; left_out: kinds that the robot cannot be asked for, with the reason.
     """
-    question, left_out = kinds_question(name, counts)
-    row, axes, about = poses_row(question), question.grid.axes, question.about
-    holds = {kind: row[f"holds_{kind}"] for kind in question.kinds}
+    grid = frame_grid(name, counts)
+    about, kinds, scenario, left_out = possible_kinds(name, grid)
+    row, axes = poses_row(about, grid, kinds), grid.axes
+    holds = {kind: row[f"holds_{kind}"] for kind in kinds}
     assert about.required is not None
     assert about.motion is not None
     return row | {
         "required_box_nm_n": about.required.box.tolist(),
         "acceleration_box_rad_s2_m_s2": about.motion.accelerations.box.tolist(),
-        "scenario": question.scenario,
+        "scenario": scenario,
         "pose_shares": pose_shares(holds),
         "frame_shares": {
             kind: workspace_volume(inside, axes, VolumeRule.CORNERS).share
@@ -170,18 +170,21 @@ def kinds_row(name: str, counts: Sequence[int]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def poses_row(question: WorkspaceQuestion) -> dict[str, Any]:
+def poses_row(about: PoseConditions, grid: WorkspaceGrid, kinds: Sequence[str]) -> dict[str, Any]:
     """Where kinds hold: points along each axis; kinds; holds_KIND, shape (nx, ny, nz); x_m, y_m,
     z_m, of the grid."""
-    task, size, shape = question.task(), question.grid.size, question.grid.shape[1:]
-    chunks = [task(k, min(k + CHUNK, size)) for k in range(0, size, CHUNK)]
+    chunks = [
+        conditions_at(about, grid, kinds, k, min(k + CHUNK, grid.size))
+        for k in range(0, grid.size, CHUNK)
+    ]
+    shape = grid.shape[1:]
     holds = {
         f"holds_{kind}": np.concatenate([chunk[kind] for chunk in chunks]).astype(bool)
-        for kind in question.kinds
+        for kind in kinds
     }
-    axes = dict(zip(("x_m", "y_m", "z_m"), question.grid.axes, strict=True))
+    axes = dict(zip(("x_m", "y_m", "z_m"), grid.axes, strict=True))
     return {
-        "points": list(shape), "kinds": list(question.kinds),
+        "points": list(shape), "kinds": list(kinds),
         **{name: inside.reshape(shape) for name, inside in holds.items()}, **axes,
     }  # fmt: skip
 
@@ -202,40 +205,43 @@ def frame_grid(name: str, counts: Sequence[int]) -> WorkspaceGrid:
     return grid_by_count(lower, upper, counts)
 
 
-def kinds_question(name: str, counts: Sequence[int]) -> tuple[WorkspaceQuestion, dict[str, str]]:
-    """Every kind that a robot can be asked for, and why it cannot be asked for the others."""
-    grid, request = frame_grid(name, counts), sets_of(load_robot(name))
+def possible_kinds(
+    name: str, grid: WorkspaceGrid
+) -> tuple[PoseConditions, list[str], str, dict[str, str]]:
+    """Conditions of every kind that a robot can have, the kinds, the scenario, and the reasons why
+    it cannot have the others."""
+    values = sets_of(load_robot(name))
 
-    def refusal(kind: str, request: WorkspaceRequest) -> str:
+    def refusal(kind: str, scenario: str | None) -> str:
         try:
-            make_workspace_question(name, [kind], grid, asked=request)
+            grid_conditions(name, [kind], (), grid, scenario, **values)
         except CdprError as refused:
             return str(refused)
         return ""
 
-    camera = replace(request, scenario=f"{name.partition('_')[0]}_pbvs")
+    scenario: str | None = f"{name.partition('_')[0]}_pbvs"
     left_out = {}
-    if problem := refusal(CAMERA_KIND, camera):
+    if problem := refusal(CAMERA_KIND, scenario):
         where, colon, words = problem.partition(": ")
         left_out[CAMERA_KIND] = f"{Path(where).name}{colon}{words}"  # no folder of this computer
-    else:
-        request = camera
-    refusals = {kind: refusal(kind, request) for kind in OF_POSES if kind not in left_out}
+        scenario = None
+    refusals = {kind: refusal(kind, scenario) for kind in OF_POSES if kind not in left_out}
     left_out |= {kind: words for kind, words in refusals.items() if words}
     kinds = [kind for kind in OF_POSES if kind not in left_out]
-    return make_workspace_question(name, kinds, grid, asked=request), left_out
+    about = grid_conditions(name, kinds, (), grid, scenario, **values)
+    return about, kinds, scenario or "", left_out
 
 
-def sets_of(robot: Robot) -> WorkspaceRequest:
-    """Wrenches to resist and accelerations to have, which the kinds of a robot are asked for."""
+def sets_of(robot: Robot) -> dict[str, Any]:
+    """Wrenches to resist and accelerations to have, for the kinds of a robot."""
     force = FORCE_SHARE * robot.platform.mass * robot.gravity
     arm = float(np.sqrt(np.mean(np.sum(robot.cable_set().p_PB ** 2, axis=0))))
     linear, angular = ACCELERATIONS
-    return WorkspaceRequest(
-        required=SpatialSet(box=np.repeat([force * arm, force], 3)),
-        accelerations=SpatialSet(box=np.repeat([angular, linear], 3)),
-        pulleys=False,  # as the theses have their workspaces
-    )
+    return {
+        "required": SpatialSet(box=np.repeat([force * arm, force], 3)),
+        "accelerations": SpatialSet(box=np.repeat([angular, linear], 3)),
+        "pulleys": False,  # as the theses have their workspaces
+    }
 
 
 # What facts ask of several rows.

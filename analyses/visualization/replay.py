@@ -153,6 +153,10 @@ class RobotPicture:
         self.meshcat.SetLine(f"traces/{name}", np.ascontiguousarray(shown.T), 3.0, color)
         self._lines.append((f"path of the {name}", look))
 
+    def explain(self, words: str, look: Look) -> None:
+        """Adds a line to the legend of the page."""
+        self._lines.append((words, look))
+
     def show_camera(self, pinhole: Pinhole) -> None:
         """Draws what a camera sees as a pyramid, for `place_camera`."""
         starts, ends = frustum(pinhole, self._depth())

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,8 @@ def with_notes(page: str, notes: PageNotes) -> str:
         f"<script>\n{_part('js')}</script>\n"
     )
     page = f"{page[:body]}{added}{page[body:]}"
+    title = escape(" ".join(notes.title.split()) or "cdpr_drake")
+    page = page.replace("<title>Drake MeshCat</title>", f"<title>{title}</title>", 1)
     return page.replace(
         "<head>",
         '<head>\n  <meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -53,11 +53,11 @@ def draw_solid(
     handles = [*axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables")]
     axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")
     axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-    axes.set_box_aspect(upper - lower, zoom=0.95)
+    axes.set_box_aspect(upper - lower, zoom=0.9)
     axes.view_init(*VIEW)
     axes.tick_params(labelsize=9)
     axes.locator_params(nbins=4)
-    axes.zaxis.labelpad = -0.5  # else it is cut off at the figure's right
+    axes.zaxis.labelpad = 4.0
     return [*handles, edge]
 
 

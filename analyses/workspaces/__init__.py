@@ -1,14 +1,14 @@
 """Workspaces of robots over grids of poses: which poses are inside, and measures of those.
 
-* Grids of poses: what `cdpr stability` and `cdpr workspace` share. Each says its tasks and makes a
-  result of their arrays; how chunks are kept, found again and computed in processes or on a cluster
-  is here, and so are the grid, the results' file and their numbers.
-* Workspaces of a robot (`cdpr workspace`): `KINDS` and `MEASURES` of `conditions` are the tables of
-  kinds and measures by name; a new kind is a row.
-* Workspaces of control stability (`cdpr stability`): where a visual servo is stable.
+* `workspace`: the verb `compute_workspace` and its result, of `cdpr workspace`. `KINDS` and
+  `MEASURES` of `conditions` are the tables of kinds and measures by name; a new kind is a row.
+  `robot_conditions` has what they know of a robot.
+* `stability`: the verb `assess_stability` and its result, of `cdpr stability`: where a visual servo
+  is stable in spite of perturbations.
+* `pose_grid` and `grid_runs`: what both share: grids, chunks of poses that are kept and found
+  again, and the file of their arrays.
 
-Each of the two has its question, its sweep over the grid, its figures and its page. Figures are
-imported when they are asked for.
+Figures are imported when they are drawn.
 
 Source: workspaces: Gazebo thesis 2.6, servoing thesis 1.2.2 and 1.3.3; control stability:
 servoing thesis 3.3.

@@ -1,31 +1,30 @@
-"""Boxes of a question that are proven inside or outside: found, kept, compared with the rest."""
+"""Boxes of poses that are proven inside or outside: found, kept, compared with grid and hull."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.folder import Folder, load_arrays
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.sweeps.folder import load_arrays, store_arrays
+from cdpr_drake.analyses.workspaces.conditions import PoseConditions
 from cdpr_drake.analyses.workspaces.pose_grid import plain
-from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
-from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import DataFileError, OutputFolderError, WorkspaceError
+from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.box_expansion_kernel import OPEN
-from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
+from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement
 from cdpr_drake.workspaces.box_judges import MEETING, CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.box_refinement import PathTube, refine
 from cdpr_drake.workspaces.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.mesh_files import write_cells
 
 BOX_ARRAYS, JOURNAL, REFINED_JOURNAL = "boxes.npz", "boxes_journal.npz", "refined_journal.npz"
@@ -69,41 +68,37 @@ class BoxSearch:
 
     def arguments(self) -> dict[str, Any]:
         """All that verdicts depend on, for JSON."""
-        asked = self.task if len(self.tasks) == 1 else self.tasks
-        found: dict[str, Any] = plain(
-            {"cdpr_drake": code_version(), "task": asked, "box": self.box}
-        )
-        return found
+        tasks = self.task if len(self.tasks) == 1 else self.tasks
+        arguments = {"cdpr_drake": code_version(), "task": tasks, "box": self.box}
+        result: dict[str, Any] = plain(arguments)
+        return result
 
 
 def box_search(
-    question: WorkspaceQuestion,
-    robot: Robot,
-    errors: tuple[float, float] = (0.0, 0.0),
-    region: tuple[Array, Array] | None = None,
-) -> BoxSearch:
-    """A region of positions, to be cut into boxes inside or outside the workspace of a question.
+    robot: Robot, about: PoseConditions, kinds: Sequence[str], angles: Array,
+    errors: tuple[float, float] = (0.0, 0.0), region: tuple[Array, Array] | None = None,
+) -> BoxSearch:  # fmt: skip
+    """A region of positions, to be cut into boxes inside or outside all of some kinds.
 
     Args:
-        question: The question; the orientations of its grid are a range, from the least to the
-            largest of each angle, all of which are proven.
         robot: The robot, for its frame and motion.
+        about: What the kinds know of it.
+        kinds: Names of `CertifiedKind`.
+        angles: Orientations from whose least to whose largest angles all are proven, shape (k, 3)
+            [rad].
         errors: How far exit points and anchor points may be off [m].
-        region: Corners of the region, shape (3,) each [m]; None: the robot's frame. As far as the
-            motion type lets Po go.
+        region: Corners of the region, shape (3,) each [m]; None: the robot's frame. It counts as
+            far as the motion type lets Po go.
 
     Raises:
-        WorkspaceError: A kind cannot be proven, or there is a method of tensions, of which a proof
-            says nothing.
+        WorkspaceError: A kind cannot be proven, or the conditions have a method of tensions, of
+            which a proof says nothing.
     """
-    known = [kind.value for kind in CertifiedKind]
-    if not set(question.kinds) <= set(known):
+    provable = [kind.value for kind in CertifiedKind]
+    if not set(kinds) <= set(provable):
         raise WorkspaceError(
-            f"certify: found kinds {','.join(question.kinds)}; accepted: {', '.join(known)}"
+            f"certify: found kinds {','.join(kinds)}; accepted: {', '.join(provable)}"
         )
-    if question.rule != "all":
-        raise WorkspaceError(f"certify: found orientations {question.rule}; accepted: all")
-    about = question.about
     if np.any(about.case.cables.arm > 0.0):
         raise WorkspaceError(
             f"certify: found {robot.name} with arms, pulley.arm {robot.pulley.arm:g}; accepted: "
@@ -119,13 +114,12 @@ def box_search(
             CertifiedKind(kind), about.case, about.required or SpatialSet(), about.around,
             about.clearance, *errors,
         )
-        for kind in question.kinds
+        for kind in kinds
     )  # fmt: skip
     lower, upper = robot.reach()
     if region is not None:
         free = lower < upper
         lower, upper = np.where(free, region[0], lower), np.where(free, region[1], upper)
-    angles = question.grid.angles
     box = PoseBox(
         np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])
     )
@@ -135,17 +129,17 @@ def box_search(
 def certified_boxes(
     search: BoxSearch,
     most_boxes: int = 200_000,
-    folder: Path | None = None,
+    folder: Folder | None = None,
     *,
     on_progress: Callable[[int, float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
 ) -> CertifiedBoxes:
-    """Boxes proven inside or outside; with a folder it continues where it was stopped or killed.
+    """Boxes proven inside or outside; with a folder it goes on where it was stopped or killed.
 
     Args:
         search: What is to be proven, and where.
         most_boxes: How many boxes are judged, at most; more of them continue a search for fewer.
-        folder: A folder that exists, for `JOURNAL`; None: nothing is kept.
+        folder: Where `JOURNAL` is kept; None: nowhere.
         on_progress: As `workspaces.certify`.
         should_stop: As `workspaces.certify`.
 
@@ -153,13 +147,11 @@ def certified_boxes(
         WorkspaceError: most_boxes < 1.
         OutputFolderError: The folder cannot be written.
     """
-    kept = _KeptJournal(folder, JOURNAL, search.arguments(), len(search.tasks) > 1)
-    found = certify(
-        search.tasks, search.box, most_boxes, on_progress=on_progress, should_stop=should_stop,
-        known=kept.known, on_journal=kept.keep,
-    )  # fmt: skip
-    kept.save()
-    return found
+    with _journal(folder, JOURNAL, search, search.arguments()) as (earlier, keep):
+        return certify(
+            search.tasks, search.box, most_boxes, on_progress=on_progress,
+            should_stop=should_stop, known=earlier, on_journal=keep,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +172,7 @@ class RefinedBoxes:
     after: float
     judged: int
 
-    def numbers(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "way_m": self.tube.poses[:, :3].tolist(),
@@ -192,12 +184,12 @@ class RefinedBoxes:
 
 
 def refined_boxes(
-    found: CertifiedBoxes,
+    boxes: CertifiedBoxes,
     search: BoxSearch,
     way: Array,
     reach: float,
     most_boxes: int,
-    folder: Path | None = None,
+    folder: Folder | None = None,
     *,
     on_progress: Callable[[int, float], None] | None = None,
     should_stop: Callable[[], bool] | None = None,
@@ -205,12 +197,12 @@ def refined_boxes(
     """Open boxes cut further about a way of Po, at all orientations of the search.
 
     Args:
-        found: What was found of the whole.
+        boxes: Boxes of the whole region.
         search: What is to be proven, and where.
         way: Corners of the way, shape (n, 3) [m].
         reach: How far Po may be off it along each axis [m].
         most_boxes: How many more boxes are judged, at most.
-        folder: As of `certified_boxes`, for `REFINED_JOURNAL`.
+        folder: Where `REFINED_JOURNAL` is kept; None: nowhere.
         on_progress: As `workspaces.refine`.
         should_stop: As `workspaces.refine`.
 
@@ -224,107 +216,79 @@ def refined_boxes(
         np.hstack([way, np.repeat(middle[np.newaxis], len(way), axis=0)]),
         np.concatenate([np.full(3, reach), turns]),
     )
-    if not np.any(tube.meets(found.poses, found.halves)):
+    if not np.any(tube.meets(boxes.poses, boxes.halves)):
         raise WorkspaceError(
             f"refine: found a way that is nowhere within {reach:g} m of the boxes; accepted: one "
             f"in x, y, z from {search.box.lower[:3]} to {search.box.upper[:3]} m"
         )
-    asked = search.arguments() | plain({"tube": tube, "boxes": int(found.curve[-1, 0])})
-    kept = _KeptJournal(folder, REFINED_JOURNAL, asked, len(search.tasks) > 1)
-    finer = refine(
-        found, search.tasks, tube, most_boxes, on_progress=on_progress, should_stop=should_stop,
-        known=kept.known, on_journal=kept.keep,
-    )  # fmt: skip
-    kept.save()
-    judged = int(finer.curve[-1, 0] - found.curve[-1, 0])
-    return RefinedBoxes(finer, tube, _open_share(found, tube), _open_share(finer, tube), judged)
+    arguments = search.arguments() | plain({"tube": tube, "boxes": int(boxes.curve[-1, 0])})
+    with _journal(folder, REFINED_JOURNAL, search, arguments) as (earlier, keep):
+        finer = refine(
+            boxes, search.tasks, tube, most_boxes, on_progress=on_progress,
+            should_stop=should_stop, known=earlier, on_journal=keep,
+        )  # fmt: skip
+    judged = int(finer.curve[-1, 0] - boxes.curve[-1, 0])
+    return RefinedBoxes(finer, tube, _open_share(boxes, tube), _open_share(finer, tube), judged)
 
 
-def _open_share(found: CertifiedBoxes, tube: PathTube) -> float:
-    met = tube.meets(found.poses, found.halves)
-    sizes = np.prod(np.where(found.halves > 0.0, found.halves, 1.0), axis=1)[met]
-    return float(np.sum(sizes[found.verdicts[met] == OPEN]) / np.sum(sizes)) if len(sizes) else 0.0
+def _open_share(boxes: CertifiedBoxes, tube: PathTube) -> float:
+    met = tube.meets(boxes.poses, boxes.halves)
+    sizes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0), axis=1)[met]
+    return float(np.sum(sizes[boxes.verdicts[met] == OPEN]) / np.sum(sizes)) if len(sizes) else 0.0
 
 
-class _KeptJournal:
-    """A journal in a folder, written now and then."""
+@contextmanager
+def _journal(
+    folder: Folder | None, name: str, search: BoxSearch, arguments: Mapping[str, Any]
+) -> Iterator[tuple[BoxJournal | None, Callable[[BoxJournal], None]]]:
+    """What an earlier search of the same had judged, and what keeps a journal now and then."""
+    words = json.dumps(arguments, sort_keys=True)
+    earlier, last, saved = None, None, time.monotonic()
+    stored = None if folder is None else load_arrays(folder.path / name)
+    if stored is not None and str(stored["about"]) == words:
+        earlier = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
 
-    def __init__(
-        self, folder: Path | None, name: str, asked: Mapping[str, Any], several: bool
-    ) -> None:
-        """With what it is of; a journal of something else is not read.
+    def save() -> None:
+        if last is not None and folder is not None:
+            verdicts, axes, proven = last.arrays()
+            arrays = {"about": np.array(words), "verdicts": verdicts, "axes": axes}
+            several = {"proven": proven} if len(search.tasks) > 1 else {}
+            folder.write_arrays(name, arrays | several)
 
-        Args:
-            folder: Where it is; None: nowhere.
-            name: Its file.
-            asked: All that verdicts depend on, for JSON.
-            several: Whether it is of several kinds.
-        """
-        self._folder, self._name, self._several = folder, name, several
-        self._words = json.dumps(asked, sort_keys=True)
-        self._last: BoxJournal | None = None
-        self._saved = time.monotonic()
-        self.known: BoxJournal | None = None
-        if folder is not None:
-            stored = load_arrays(folder / name)
-            if stored is not None and str(stored["about"]) == self._words:
-                self.known = BoxJournal(stored["verdicts"], stored["axes"], stored.get("proven"))
+    def keep(journal: BoxJournal) -> None:
+        nonlocal last, saved
+        last = journal
+        if time.monotonic() - saved > SAVE_SECONDS:
+            save()
+            saved = time.monotonic()
 
-    def keep(self, journal: BoxJournal) -> None:
-        """Takes what is known by now."""
-        self._last = journal
-        if time.monotonic() - self._saved > SAVE_SECONDS:
-            self.save()
-
-    def save(self) -> None:
-        """Writes what is known by now, if anything is new.
-
-        Raises:
-            OutputFolderError: The folder cannot be written.
-        """
-        if self._last is None or self._folder is None:
-            return
-        verdicts, axes, proven = self._last.arrays()
-        arrays = {"about": np.array(self._words), "verdicts": verdicts, "axes": axes}
-        if self._several:
-            arrays["proven"] = proven
-        try:
-            store_arrays(self._folder / self._name, arrays)
-        except OSError as problem:
-            raise OutputFolderError(
-                f"{self._folder}: cannot be written: {problem.strerror}"
-            ) from problem
-        self._saved = time.monotonic()
+    yield earlier, keep
+    save()
 
 
-def box_numbers(found: CertifiedBoxes, search: BoxSearch | None = None) -> dict[str, Any]:
+def box_numbers(boxes: CertifiedBoxes, search: BoxSearch) -> dict[str, Any]:
     """What was cut into boxes, shares and the curve for JSON."""
     return {
-        **({} if search is None else search.words()),
-        "boxes_judged": int(found.curve[-1, 0]),
-        "inside_share": found.inside,
-        "outside_share": found.outside,
-        "open_share": found.open,
-        "finished": found.finished,
+        **search.words(),
+        "boxes_judged": int(boxes.curve[-1, 0]), "inside_share": boxes.inside,
+        "outside_share": boxes.outside, "open_share": boxes.open, "finished": boxes.finished,
         "curve": [
             {"boxes": int(n), "inside": a, "outside": b, "open": c}
-            for n, a, b, c in found.curve.tolist()
+            for n, a, b, c in boxes.curve.tolist()
         ],
-    }
+    }  # fmt: skip
 
 
-def save_boxes(found: CertifiedBoxes, folder: Path) -> Path:
-    """Writes `boxes.npz` into a folder that exists, and returns its path.
+def save_boxes(boxes: CertifiedBoxes, folder: Folder) -> None:
+    """Writes `BOX_ARRAYS`.
 
     Of several kinds the bits that say which are proven of each box are there, too, so that boxes
     that are read again can be refined.
     """
-    path = folder / BOX_ARRAYS
-    arrays = {name: getattr(found, name) for name in ("poses", "halves", "verdicts", "curve")}
-    if found.proven is not None:
-        arrays["proven"] = found.proven
-    store_arrays(path, arrays)
-    return path
+    arrays = {name: getattr(boxes, name) for name in ("poses", "halves", "verdicts", "curve")}
+    if boxes.proven is not None:
+        arrays["proven"] = boxes.proven
+    folder.write_arrays(BOX_ARRAYS, arrays)
 
 
 def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
@@ -344,45 +308,30 @@ def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
     return CertifiedBoxes(poses, halves, verdicts, curve, finished, arrays.get("proven"))
 
 
-def write_boxes(found: CertifiedBoxes, path: Path) -> Path:
+def write_boxes(boxes: CertifiedBoxes, path: Path) -> Path:
     """Writes the positions of the boxes as cells of VTK, with verdict and half angles.
 
     Raises:
         WorkspaceError: The file's ending is none of `mesh_files.GRID_ENDINGS`, or meshio is not
             installed.
     """
-    numbers: dict[str, np.ndarray] = {"verdict": found.verdicts.astype(np.int32)}
-    if np.any(found.halves[:, 3:]):
+    numbers: dict[str, np.ndarray] = {"verdict": boxes.verdicts.astype(np.int32)}
+    if np.any(boxes.halves[:, 3:]):
         for k, name in enumerate(("phi", "theta", "psi"), 3):
-            numbers[name], numbers[f"half_{name}"] = found.poses[:, k], found.halves[:, k]
-    return write_cells(path, found.poses[:, :3], found.halves[:, :3], numbers)
+            numbers[name], numbers[f"half_{name}"] = boxes.poses[:, k], boxes.halves[:, k]
+    return write_cells(path, boxes.poses[:, :3], boxes.halves[:, :3], numbers)
 
 
-def agreements(
-    workspace: RobotWorkspace, hull: WorkspaceHull | None, boxes: CertifiedBoxes
-) -> dict[str, BoxAgreement]:
-    """What boxes say of every pose of the grid, and of the ends of a hull's rays.
-
-    Each is inside a proven box only if it belongs to the workspace by itself, and inside one that
-    is proven outside only if it does not.
-    """
-    found = {"grid": grid_agreement(boxes, workspace.grid, workspace.inside(ALL))}
-    angles = workspace.grid.angles
-    if hull is not None and len(angles) == 1:
-        found["hull"] = hull_agreement(boxes, hull, angles[0])
-    return found
-
-
-def agreement_numbers(found: Mapping[str, BoxAgreement]) -> dict[str, Any]:
+def agreement_numbers(agreement: Mapping[str, BoxAgreement]) -> dict[str, Any]:
     """Counts, and the first poses at which boxes are wrong, for JSON."""
     return {
         name: {
-            "poses": one.poses,
-            "in_boxes_proven_inside": one.inside,
-            "in_boxes_proven_outside": one.outside,
-            "in_open_boxes_or_none": one.poses - one.inside - one.outside,
-            "contradictions": len(one.broken),
-            "first_contradictions_m_rad": one.broken[:NAMED].tolist(),
+            "poses": part.poses,
+            "in_boxes_proven_inside": part.inside,
+            "in_boxes_proven_outside": part.outside,
+            "in_open_boxes_or_none": part.poses - part.inside - part.outside,
+            "contradictions": len(part.broken),
+            "first_contradictions_m_rad": part.broken[:NAMED].tolist(),
         }
-        for name, one in found.items()
+        for name, part in agreement.items()
     }

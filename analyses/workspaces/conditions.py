@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.workspaces.break_tasks import BEST, EXCURSION, SURVIVES, WORST, BreakTask
-from cdpr_drake.analyses.workspaces.stability_tasks import StabilityTask
+from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 from cdpr_drake.workspaces.cable_interference import Surroundings, clearances
@@ -36,6 +37,29 @@ from cdpr_drake.workspaces.wrench_capacity import (
     largest_payloads,
 )
 
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
+    from cdpr_drake.analyses.workspaces.servo_stability import ServoStability
+
+SURVIVES, EXCURSION, WORST, BEST = (
+    "dynamic-single-failure", "break-excursion", "worst-cable", "best-reaction",
+)  # fmt: skip
+
+OF_BREAKS = (EXCURSION, WORST, BEST)
+"""Measures that come with the kind `SURVIVES`."""
+
+NUMBERED = (WORST, BEST)
+"""Measures that number something, and have no range."""
+
+ALL = "all"
+"""Name of what all kinds have in common."""
+
+RULES = {"all": "in every orientation (inclusion)", "any": "in some orientation (maximal)"}
+"""Which positions belong to a workspace, with several orientations."""
+
+SECTIONS = ("cables", "winches", "damping", "torque_control", "integration")
+"""Sections of a scenario on which simulated breaks depend."""
+
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
@@ -55,6 +79,62 @@ class CameraView:
 
 
 @dataclass(frozen=True, eq=False)
+class SimulatedBreaks:
+    """All single breaks of a cable at the poses of a grid, with every reaction.
+
+    Attributes:
+        robot: The robot.
+        request: Reactions, velocity and scenario of the breaks.
+        grid: The poses.
+    """
+
+    robot: Robot
+    request: BreakRequest
+    grid: WorkspaceGrid
+    _last: dict[tuple[int, int], dict[str, np.ndarray]] = field(default_factory=dict)
+
+    def arguments(self) -> dict[str, Any]:
+        """What its numbers depend on, for JSON."""
+        request = self.request
+        return {
+            "scenario": request.scenario.name,
+            "reactions": list(request.reactions),
+            "moving_m_s": plain(np.asarray(request.velocity, float)),
+            "after_s": request.after,
+            "limits_n": None if request.limits is None else list(request.limits),
+            "cable_names": [cable.name for cable in self.robot.cables],
+            **{name: plain(getattr(request.scenario, name)) for name in SECTIONS},
+        }
+
+    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
+        """Arrays of the poses start to stop, shape (n,).
+
+        `SURVIVES`; `EXCURSION`, how far the best reaction to the worst break goes [m]; `WORST`,
+        number of that cable, from 1; `BEST`, number of that reaction in the request, from 1.
+        The last three are NaN where all cables do not hold the pose. The arrays of the last poses
+        are kept, since the kind and each measure read them.
+        """
+        if (start, stop) not in self._last:
+            rows = [self._at(number) for number in range(start, stop)]
+            table = np.array(rows, float).reshape(stop - start, 4)
+            self._last.clear()
+            self._last[start, stop] = {
+                SURVIVES: table[:, 0] > 0.0, EXCURSION: table[:, 1], WORST: table[:, 2],
+                BEST: table[:, 3],
+            }  # fmt: skip
+        return self._last[start, stop]
+
+    def _at(self, number: int) -> tuple[float, float, float, float]:
+        from cdpr_drake.analyses.simulation.break_survival import breaks_at  # few need it
+
+        outcomes = breaks_at(self.robot, self.grid.poses(number, number + 1)[0], self.request)
+        if outcomes is None:
+            return 0.0, np.nan, np.nan, np.nan
+        cable, reaction, excursion, saved = outcomes.worst()
+        return float(saved), excursion, cable + 1.0, reaction + 1.0
+
+
+@dataclass(frozen=True, eq=False)
 class PoseConditions:
     """All that kinds and measures know about a robot.
 
@@ -67,9 +147,9 @@ class PoseConditions:
         required: Wrenches to resist beside the weight; None: none were given.
         motion: Accelerations and velocities; None: none were given.
         view: What the camera shall see; None: none was given.
-        stable: The sweep task of the criterion of stability; None: it was not asked for.
+        stable: The criterion of stability at the poses of the grid; None: it is not needed.
         method: Name of the method of tensions for the kind `static`; None: any tensions.
-        breaks: The sweep task of single breaks that are simulated; None: it was not asked for.
+        breaks: Single breaks simulated at the poses of the grid; None: they are not needed.
     """
 
     case: StaticCase
@@ -80,9 +160,9 @@ class PoseConditions:
     required: SpatialSet | None = None
     motion: MotionDemand | None = None
     view: CameraView | None = None
-    stable: StabilityTask | None = None
+    stable: ServoStability | None = None
     method: str | None = None
-    breaks: BreakTask | None = None
+    breaks: SimulatedBreaks | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +229,11 @@ def _far(about: PoseConditions, at: Poses, parts: slice) -> np.ndarray:
 def _visible(about: PoseConditions, at: Poses) -> np.ndarray:
     view = about.view
     assert view is not None
-    seen = []
+    visible = []
     for p, R in zip(at.positions, at.rotations, strict=True):
         X_WC = RigidTransform(RotationMatrix(R), p) @ view.X_PC
-        seen.append(view.target.in_view(X_WC.inverse() @ view.X_WO, view.pinhole))
-    return np.array(seen, bool)
+        visible.append(view.target.in_view(X_WC.inverse() @ view.X_WO, view.pinhole))
+    return np.array(visible, bool)
 
 
 def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
@@ -213,8 +293,8 @@ def _capacity(about: PoseConditions, at: Poses) -> Array:
 
 
 def _frequency(about: PoseConditions, at: Poses) -> Array:
-    found = stiffness_at(about.case, at.positions, at.rotations)
-    return first_frequencies(found, about.case, about.body, at.rotations)
+    stiffness = stiffness_at(about.case, at.positions, at.rotations)
+    return first_frequencies(stiffness, about.case, about.body, at.rotations)
 
 
 def _clearance(about: PoseConditions, at: Poses) -> Array:
@@ -264,20 +344,12 @@ MEASURES: dict[str, Measure] = {
 """Measures of a pose by name."""
 
 
-@dataclass(frozen=True, eq=False)
-class ConditionsTask:
-    """Sweep task: which kinds hold at the poses of a grid, and the measures there."""
-
-    about: PoseConditions
-    grid: WorkspaceGrid
-    kinds: tuple[str, ...]
-    measures: tuple[str, ...]
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Arrays by the names of kinds and measures, of the poses start to stop, shape (n,)."""
-        at = Poses(start, stop, self.grid.positions(start, stop), self.grid.rotations(start, stop))
-        found: Mapping[str, np.ndarray] = {
-            **{name: KINDS[name].holds(self.about, at) for name in self.kinds},
-            **{name: MEASURES[name].value(self.about, at) for name in self.measures},
-        }
-        return dict(found)
+def conditions_at(
+    about: PoseConditions, grid: WorkspaceGrid, names: Iterable[str], start: int, stop: int
+) -> dict[str, np.ndarray]:
+    """Kinds and measures at the poses start to stop of a grid, by name, shape (n,)."""
+    at = Poses(start, stop, grid.positions(start, stop), grid.rotations(start, stop))
+    return {
+        name: KINDS[name].holds(about, at) if name in KINDS else MEASURES[name].value(about, at)
+        for name in names
+    }

@@ -11,11 +11,8 @@ import numpy as np
 
 from cdpr_drake.analyses.workspaces.box_certificates import box_search
 from cdpr_drake.analyses.workspaces.conditions import KINDS, PoseConditions, Poses
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceRequest,
-    interference_bodies,
-    make_workspace_question,
-)
+from cdpr_drake.analyses.workspaces.pose_grid import check_grid
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies, pose_conditions
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.poses import rotation_from_angles
@@ -139,9 +136,9 @@ class ProvenSets(PoseSets):
         around = interference_bodies(
             loaded, obstacles, settings.exit_free, settings.anchor_free, settings.pulleys
         )
-        asked = WorkspaceRequest(
-            limits=settings.limits, required=required, clearance=settings.clearance, around=around,
-            pulleys=settings.pulleys,
+        about = pose_conditions(
+            loaded, limits=settings.limits, required=required, clearance=settings.clearance,
+            around=around, pulleys=settings.pulleys,
         )  # fmt: skip
         named = must if isinstance(must, Mapping) else {f"must[{k}]": p for k, p in enumerate(must)}
         low, high = loaded.reach()
@@ -152,14 +149,14 @@ class ProvenSets(PoseSets):
             high = np.where(free, places.max(axis=0), high)
         axes = tuple(np.unique([a, b]) for a, b in zip(low, high, strict=True))
         grid = WorkspaceGrid((axes[0], axes[1], axes[2]), np.unique(turned, axis=0))
-        question = make_workspace_question(loaded, chosen, grid, asked=asked)
-        search = box_search(question, loaded, region=(low, high))
+        check_grid(loaded, grid)
+        search = box_search(loaded, about, chosen, grid.angles, region=(low, high))
         draft = ProvenSets(
             np.zeros((1, 6)),
             np.zeros((1, 6)),
             np.zeros(1, int),
             kinds=chosen,
-            conditions=question.about,
+            conditions=about,
             tasks=search.tasks,
             about=_about(loaded, chosen, turned, obstacles, box, settings)
             | _turning_told(angular, moments),

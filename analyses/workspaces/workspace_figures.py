@@ -1,42 +1,33 @@
-"""Figures of workspaces: planes coloured by a measure or by what holds, and wrench sets."""
+"""Figures of workspaces: planes by what holds or by a measure, breaks, boxes, wrench sets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 from textwrap import wrap
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, plain_numbers
-from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
-from cdpr_drake.analyses.workspaces.break_tasks import NUMBERED, SURVIVES
-from cdpr_drake.analyses.workspaces.conditions import MEASURES
-from cdpr_drake.analyses.workspaces.stability_figures import (
-    around_robot,
-    cell_edges,
-    draw_robot,
-    even_choice,
-    plane_axes,
-)
-from cdpr_drake.analyses.workspaces.workspace_question import RULES
-from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
+from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
+from cdpr_drake.analyses.workspaces.plane_panels import CELLS, draw_planes, plane_axes
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.workspaces import box_expansion_kernel
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.workspaces.workspace_result import Workspace
 
 OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 """Of cells where no kind holds, where some do, and where all do."""
@@ -51,7 +42,6 @@ PROVEN = {
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 MOST_PLANES = 12
-COLUMNS = 4
 
 LINE = 60
 """Characters in a line of a title."""
@@ -63,146 +53,186 @@ LEAST_CONTOURED = 5
 """Lines of equal measure are drawn over so many points in both directions; over fewer they are
 straight, and their numbers meet."""
 
+MARKERS = ("s", "o", "^", "D", "v")
+"""Symbols of reactions, in the order in which they were asked for."""
 
-def workspace_pictures(
-    workspace: RobotWorkspace,
-    formats: Sequence[str] = DEFAULT_FORMATS,
-    boxes: CertifiedBoxes | None = None,
-    robot: Robot | None = None,
-) -> Pictures:
-    """What draws the figures that a result suffices for, by the names of their files.
+BREAK_PLANES, BREAK_COLUMNS = 6, 3
 
-    Args:
-        workspace: The result.
-        formats: Endings of the files.
-        boxes: Certified boxes; None: there are none.
-        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
-    """
-    drawn: dict[str, Callable[[], Figure]] = {
-        name or "planes": partial(planes_figure, workspace, name, robot)
-        for name in (None, *workspace.values) if name not in NUMBERED
-    }  # fmt: skip
-    if SURVIVES in workspace.holds:
-        drawn["breaks"] = partial(breaks_figure, workspace)
-    if boxes is not None:
-        about = workspace.arguments
-        drawn["open_share"] = partial(boxes_figure, boxes, about["robot"], workspace.geometry)
-        drawn["boxes"] = partial(box_planes_figure, boxes, about["robot"], list(about["kinds"]))
-    return dict(figure_writers(drawn, formats))
+KEPT, LOST, UNHELD = "#ffffff", "#c8c8c8", "#8a8a8a"
+"""Of cells where every break is survived, where one is not, and that all cables do not hold."""
+
+LOOKS = {
+    KEPT: (None, "every break is survived"),
+    LOST: ("///", "one is not"),
+    UNHELD: (None, "not held by all cables"),
+}
+"""Hatching and label by colour."""
 
 
-def planes_figure(
-    workspace: RobotWorkspace, measure: str | None = None, robot: Robot | None = None
-) -> Figure:
+def planes_figure(workspace: Workspace, measure: str | None = None) -> Figure:
     """Planes of a grid, coloured by what holds, or by a measure where all kinds hold.
 
-    Planes are horizontal, but where the grid has one point along x or y and several along z. With
-    several orientations a measure is its least over them.
+    With several orientations a measure is its least over them.
 
     Args:
-        workspace: The result.
+        workspace: The result; with its robot, frame and exit points are drawn.
         measure: Name of a measure of the result; None: what holds.
-        robot: Whose frame and exit points are drawn; None: nothing but the grid is.
     """
-    normal, u, v = plane_axes(workspace.grid.shape[1:])
-    places = workspace.grid.axes[normal]
-    chosen = even_choice(len(places), MOST_PLANES)
-    edges = cell_edges(workspace.grid.axes, (u, v))
-    rows = -(-len(chosen) // COLUMNS)
-    columns = -(-len(chosen) // rows)
-    lower, upper = np.array([[e[0], e[-1]] for e in edges]).T
-    if robot is not None:
-        lower, upper = around_robot(robot, (u, v), lower, upper)
-    extents = upper - lower
-    width, height = extents * (3.0 if columns > 1 else 5.5) / np.max(extents)
-    figure, grid = new_figure(
-        rows,
-        columns,
-        (max(1.6 + (width + 0.3) * columns, 6.5), 2.2 + (height + 0.4) * rows),
-        _title(workspace, measure),
+    return _kinds_figure(workspace) if measure is None else _measure_figure(workspace, measure)
+
+
+def _kinds_figure(workspace: Workspace) -> Figure:
+    each = [workspace.places(kind) for kind in workspace.holds]
+    parts = np.where(workspace.places(ALL), 2.0, np.where(np.any(each, axis=0), 1.0, 0.0))
+    colors = ListedColormap([OUTSIDE, SOME, INSIDE])
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        axes.pcolormesh(*edges, plane(parts), cmap=colors, vmin=-0.5, vmax=2.5)
+
+    title = _title(workspace, None)
+    panels = draw_planes(
+        workspace.grid, title, paint, workspace.robot, most=MOST_PLANES, parts=parts
     )
-    panels: list[Axes] = list(np.ravel(grid))
-    inside = workspace.places(ALL)
-    if measure is None:
-        kinds = [workspace.places(kind) for kind in workspace.holds]
-        cells = np.sum(kinds, axis=0) > 0
-        shown: Array = np.where(inside, 2.0, np.where(cells, 1.0, 0.0))
-        limits = (-0.5, 2.5)
-        colors: Colormap = ListedColormap([OUTSIDE, SOME, INSIDE])
-    else:
-        held = workspace.inside()
-        # With no pose inside there is nothing else to see; the title says so.
-        shown = _least(workspace.values[measure], held if held.any() else np.ones_like(held))
-        known = shown[np.isfinite(shown)]
-        limits = (float(np.min(known)), float(np.max(known))) if len(known) else (0.0, 1.0)
-        # A plane without a number would be an empty panel.
-        colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
-    mesh = None
-    for number, (axes, k) in enumerate(zip(panels, chosen, strict=False)):
-        plane = np.take(shown, k, normal).T
-        mesh = axes.pcolormesh(*edges, plane, cmap=colors, vmin=limits[0], vmax=limits[1])
-        if measure is not None and min(plane.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
-            _contours(axes, [workspace.grid.axes[k] for k in (u, v)], plane, limits)
-        if robot is not None:
-            draw_robot(axes, robot, (u, v), edges)
-            axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
-        axes.set_aspect("equal")
-        axes.grid(False)
-        axes.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
-        axes.tick_params(labelsize=10)
-        plain_numbers(axes.xaxis)
-        plain_numbers(axes.yaxis)
-        first, lowest = number % columns == 0, number + columns >= len(chosen)
-        axes.tick_params(labelleft=first, labelbottom=lowest)
-        axes.set_ylabel(f"{'xyz'[v]} in W [m]" if first else "")
-        axes.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
-    for axes in panels[len(chosen) :]:
-        axes.remove()
-    lines, _ = panels[0].get_legend_handles_labels()
-    if measure is None:
-        labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
-        if len(workspace.holds) == 1:
-            del labels[SOME]
-        figure.legend(
-            handles=[
-                *(Patch(facecolor=color, label=label) for color, label in labels.items()),
-                *lines,
-            ],
-            loc="outside lower center",
-            ncols=3,
-            title="Each point of the grid colours the cell around it.",
-            title_fontsize=10,
-        )
-    elif mesh is not None:
-        about = MEASURES[measure]
-        figure.colorbar(mesh, ax=panels[: len(chosen)], label=f"{about.title} [{about.unit}]")
-        handles: list[Artist] = [*lines]
-        if np.any(np.isnan(np.take(shown, chosen, normal))):
-            words = "outside" if workspace.inside().any() else "no number"
-            handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
-        if handles:
-            figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    return figure
+    labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
+    if len(workspace.holds) == 1:
+        del labels[SOME]
+    patches = [Patch(facecolor=color, label=label) for color, label in labels.items()]
+    panels.figure.legend(
+        handles=[*patches, *panels.handles], loc="outside lower center", ncols=3, title=CELLS,
+        title_fontsize=10,
+    )  # fmt: skip
+    return panels.figure
 
 
-def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
+def _measure_figure(workspace: Workspace, measure: str) -> Figure:
+    inside = workspace.inside()
+    # With no pose inside there is nothing else to see; the title says so.
+    values = _least(workspace.values[measure], inside if inside.any() else np.ones_like(inside))
+    finite = values[np.isfinite(values)]
+    limits = (float(np.min(finite)), float(np.max(finite))) if len(finite) else (0.0, 1.0)
+    # A plane without a number would be an empty panel.
+    colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
+    points = [workspace.grid.axes[k] for k in plane_axes(workspace.grid.shape[1:])[1:]]
+    mesh = []
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        shown = plane(values)
+        mesh.append(axes.pcolormesh(*edges, shown, cmap=colors, vmin=limits[0], vmax=limits[1]))
+        if min(shown.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
+            _contours(axes, points, shown, limits)
+
+    panels = draw_planes(
+        workspace.grid, _title(workspace, measure), paint, workspace.robot, most=MOST_PLANES
+    )
+    about = MEASURES[measure]
+    panels.figure.colorbar(mesh[-1], ax=panels.axes, label=f"{about.title} [{about.unit}]")
+    handles: list[Artist] = [*panels.handles]
+    if np.any(np.isnan(panels.shown(values))):
+        words = "outside" if inside.any() else "no number"
+        handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
+    if handles:
+        panels.figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return panels.figure
+
+
+def breaks_figure(workspace: Workspace) -> Figure:
+    """Planes of a grid: a cell a pose, with its worst cable and the best reaction to that break.
+
+    Of several orientations the first one is drawn, and the title says so. It can be read without
+    colours: hatching, numbers and symbols say all of it.
+
+    Args:
+        workspace: A result with the kind `dynamic-single-failure`.
+    """
+    shape = workspace.grid.shape[1:]
+    arrays = [workspace.holds[SURVIVES], workspace.values[WORST], workspace.values[BEST]]
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        smallest = 72.0 * 3.6 / max(shape)  # side of a cell [pt], about
+        _draw_breaks(axes, edges, [plane(array[0]) for array in arrays], smallest)
+
+    panels = draw_planes(
+        workspace.grid, _breaks_title(workspace), paint, most=BREAK_PLANES, columns=BREAK_COLUMNS,
+        width=3.6,
+    )  # fmt: skip
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=color, edgecolor="black", hatch=hatch, label=label)
+        for color, (hatch, label) in LOOKS.items()
+    ]
+    handles += [
+        Line2D([], [], color="black", marker=marker, linestyle="none", markerfacecolor="white",
+               label=f"best: {name}")
+        for name, marker in zip(workspace.arguments["breaks"]["reactions"], MARKERS, strict=False)
+    ]  # fmt: skip
+    panels.figure.legend(
+        handles=handles, loc="outside lower center", ncols=3, title_fontsize=10,
+        title="Number: the cable whose break is worst. Symbol: the best reaction to it.",
+    )  # fmt: skip
+    return panels.figure
+
+
+def _draw_breaks(axes: Axes, edges: list[Array], planes: list[np.ndarray], smallest: float) -> None:
+    """Cells of a plane: verdicts, numbers of cables and of reactions, shape (nv, nu) each."""
+    survives, worst, best = planes
+    across, up = edges
+    for j, i in np.ndindex(*survives.shape):
+        low = float(across[i]), float(up[j])
+        high = float(across[i + 1]), float(up[j + 1])
+        held = bool(np.isfinite(worst[j, i]))
+        color = KEPT if survives[j, i] else LOST if held else UNHELD
+        axes.add_patch(
+            Rectangle(
+                low, high[0] - low[0], high[1] - low[1], facecolor=color, edgecolor="0.4",
+                linewidth=0.5, hatch=LOOKS[color][0], hatch_linewidth=0.4,
+            )
+        )  # fmt: skip
+        if not held:
+            continue
+        x, y = 0.5 * (low[0] + high[0]), low[1] + 0.68 * (high[1] - low[1])
+        axes.text(
+            x, y, f"{int(worst[j, i])}", ha="center", va="center",
+            fontsize=float(np.clip(0.42 * smallest, 4.0, 12.0)),
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+        )  # fmt: skip
+        axes.plot(
+            [x], [low[1] + 0.28 * (high[1] - low[1])], color="black", markerfacecolor="white",
+            marker=MARKERS[int(best[j, i]) - 1], markersize=float(np.clip(0.26 * smallest, 2, 8)),
+        )  # fmt: skip
+    axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
+
+
+def _breaks_title(workspace: Workspace) -> str:
+    about = workspace.arguments["breaks"]
+    speed = float(np.linalg.norm(about["moving_m_s"]))
+    turns = len(workspace.grid.angles)
+    words = "at rest" if speed == 0.0 else f"at {speed:.3g} m/s"
+    share = float(np.mean(workspace.holds[SURVIVES]))
+    several = f", first of {turns} orientations" if turns > 1 else ""
+    geometry = workspace.geometry
+    return (
+        f"{workspace.arguments['robot']}, {geometry}: any one cable breaks {words}{several}\n"
+        f"survived at {share:.0%} of the poses"
+    )
+
+
+def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
     """Shares that are proven, and what is open, against the number of boxes.
 
     Args:
-        found: The boxes.
+        boxes: The boxes.
         robot: Name of the robot.
         cables: How its cables run, in words; empty: nothing is said.
     """
     words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
     figure, axes = new_figure(
-        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{found.open:.2%} of the box open"
+        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{boxes.open:.2%} of the box open"
     )
     names = ("proven inside", "proven outside", "open")
-    for number, (name, share) in enumerate(zip(names, found.curve[:, 1:].T, strict=True)):
+    for number, (name, share) in enumerate(zip(names, boxes.curve[:, 1:].T, strict=True)):
         look = nth_look(number)
         shown = share > 0.0  # on a logarithmic axis
         axes.plot(
-            found.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
+            boxes.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
             marker=look.marker, markersize=4,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
@@ -210,18 +240,18 @@ def boxes_figure(found: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
     return figure
 
 
-def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
+def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
     """What is proven in three planes through the middle of the region that was cut.
 
     Angles that vary are in the middle of their ranges.
 
     Args:
-        found: The boxes.
+        boxes: The boxes.
         robot: Name of the robot.
         kinds: What was proven.
     """
-    low = np.min(found.poses - found.halves, axis=0)
-    high = np.max(found.poses + found.halves, axis=0)
+    low = np.min(boxes.poses - boxes.halves, axis=0)
+    high = np.max(boxes.poses + boxes.halves, axis=0)
     middle = 0.5 * (low + high)
     wide = [k for k in range(3) if low[k] < high[k]]
     planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
@@ -231,12 +261,12 @@ def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
     at = middle + 1e-6 * (high - low)
     for axes, normal in zip(np.ravel(grid), planes, strict=True):
         u, v = (k for k in range(3) if k != normal)
-        others = [k for k in range(found.poses.shape[1]) if k not in (u, v)]
-        hit = np.all(np.abs(found.poses - at)[:, others] <= found.halves[:, others] + 1e-12, axis=1)
+        others = [k for k in range(boxes.poses.shape[1]) if k not in (u, v)]
+        hit = np.all(np.abs(boxes.poses - at)[:, others] <= boxes.halves[:, others] + 1e-12, axis=1)
         for verdict, (_, color, hatch) in PROVEN.items():
-            some = np.flatnonzero(hit & (found.verdicts == verdict))
-            corners = (found.poses - found.halves)[some][:, (u, v)]
-            sizes = 2.0 * found.halves[some][:, (u, v)]
+            numbers = np.flatnonzero(hit & (boxes.verdicts == verdict))
+            corners = (boxes.poses - boxes.halves)[numbers][:, (u, v)]
+            sizes = 2.0 * boxes.halves[numbers][:, (u, v)]
             cells = corners[:, np.newaxis] + sizes[:, np.newaxis] * SQUARE
             axes.add_collection(
                 PolyCollection(
@@ -260,15 +290,14 @@ def box_planes_figure(found: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
 
 def _least(values: Array, inside: np.ndarray) -> Array:
     """Least value over the orientations where all holds; NaN where none does."""
-    some = np.where(inside & np.isfinite(values), values, np.inf)
-    least = np.min(some, axis=0)
+    least = np.min(np.where(inside & np.isfinite(values), values, np.inf), axis=0)
     return np.where(np.isfinite(least), least, np.nan)
 
 
 def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:
-    known = plane[np.isfinite(plane)]
+    finite = plane[np.isfinite(plane)]
     levels = MaxNLocator(CONTOURS).tick_values(*limits)
-    if len(known) == 0 or not np.any((levels > known.min()) & (levels < known.max())):
+    if len(finite) == 0 or not np.any((levels > finite.min()) & (levels < finite.max())):
         return
     lines = axes.contour(
         *along, np.ma.masked_invalid(plane), levels, colors="black", linewidths=0.6
@@ -276,7 +305,7 @@ def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float,
     axes.clabel(lines, fmt="%.3g", fontsize=8)
 
 
-def _title(workspace: RobotWorkspace, measure: str | None) -> str:
+def _title(workspace: Workspace, measure: str | None) -> str:
     about = workspace.arguments
     volume = workspace.volume()
     what = ", ".join(workspace.holds) if measure is None else MEASURES[measure].title
@@ -289,15 +318,15 @@ def _title(workspace: RobotWorkspace, measure: str | None) -> str:
     return "\n".join(words) + f"\n{share}{rule}"
 
 
-def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure:
+def wrench_set_figure(wrenches: AvailableWrenches, at: Array, title: str) -> Figure:
     """Sections through what cables can give: forces at the moments of `at`, and the other way.
 
     Args:
-        found: The wrenches, of six rows or of those of a planar platform, (moment, f_x, f_y).
+        wrenches: The wrenches, of six rows or of those of a planar platform, (moment, f_x, f_y).
         at: A wrench W t that is marked, such as what the weight demands, shape (n,) [N m, N].
         title: Title of the figure.
     """
-    if len(found.row_scale) == 6:
+    if len(wrenches.row_scale) == 6:
         panels = [(3, 4), (3, 5), (4, 5), (0, 1), (0, 2), (1, 2)]
         names = ["m_x", "m_y", "m_z", "f_x", "f_y", "f_z"]
     else:
@@ -305,7 +334,7 @@ def wrench_set_figure(found: AvailableWrenches, at: Array, title: str) -> Figure
     units = [f"${name}$ [{'N m' if name[0] == 'm' else 'N'}]" for name in names]
     figure, grid = new_figure(-(-len(panels) // 3), 3, (11.0, 4.2 * -(-len(panels) // 3)), title)
     for axes, rows in zip(np.ravel(grid), panels, strict=True):
-        corners = found.section(rows, at)
+        corners = wrenches.section(rows, at)
         if len(corners):
             axes.fill(*corners.T, facecolor=INSIDE, alpha=0.35, edgecolor=INSIDE, linewidth=1.5)
         axes.plot(at[rows[0]], at[rows[1]], "k+", markersize=10)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies
 from cdpr_drake.errors import (
     CableGeometryError,
     CdprError,

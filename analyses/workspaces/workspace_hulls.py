@@ -1,17 +1,16 @@
-"""Another way to draw a workspace: its hull, seen from a centre."""
+"""The hull of a workspace, seen from a centre."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.sweeps.folder import load_arrays, store_arrays
-from cdpr_drake.analyses.workspaces.conditions import KINDS, Poses
-from cdpr_drake.analyses.workspaces.workspace_question import WorkspaceQuestion
+from cdpr_drake.analyses.frame.folder import Folder, load_arrays
+from cdpr_drake.analyses.workspaces.conditions import KINDS, SURVIVES, PoseConditions, Poses
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.geometry.poses import rotation_from_angles
@@ -21,31 +20,8 @@ from cdpr_drake.workspaces.hull import FIRST_STEPS, WorkspaceHull, workspace_hul
 HULL_ARRAYS = "hull.npz"
 """File of a hull's triangles."""
 
-
-def question_holds(question: WorkspaceQuestion) -> Callable[[Array], np.ndarray]:
-    """Whether all kinds of a question hold at positions, shape (n, 3), as its rule says.
-
-    Raises:
-        WorkspaceError: It has a kind that knows the poses of its grid only.
-    """
-    for name in ("stable", "dynamic-single-failure"):
-        if name in question.kinds:
-            raise WorkspaceError(f"hull: found kinds {name}; accepted: kinds other than that")
-    turns = np.array([rotation_from_angles(a).matrix() for a in question.grid.angles])
-    every = question.rule == "all"
-
-    def holds(positions: Array) -> np.ndarray:
-        n = len(positions)
-        inside = np.full(n, every)
-        for turn in turns:
-            at = Poses(0, n, positions, np.tile(turn, (n, 1, 1)))
-            here = np.ones(n, bool)
-            for name in question.kinds:
-                here &= KINDS[name].holds(question.about, at)
-            inside = inside & here if every else inside | here
-        return inside
-
-    return holds
+NAMES = ("center", "vertices", "faces", "cut", "tolerance")
+"""Arrays of that file."""
 
 
 REACH = 10
@@ -98,43 +74,59 @@ def hull_bound(
     return HullBound(NOTHING, why, middle - half, middle + half)
 
 
-def question_hull(
-    question: WorkspaceQuestion,
-    robot: Robot,
-    center: Array,
-    rays: int = 10_000,
-    tolerance: float = 1e-3,
-    bound: HullBound | None = None,
-) -> WorkspaceHull:
-    """The hull of what a question asks for.
+def robot_hull(
+    robot: Robot, about: PoseConditions, kinds: Sequence[str], center: Array | Sequence[float],
+    bound: HullBound | None = None, *, angles: Array | None = None, rule: str = "all",
+    rays: int = 10_000, tolerance: float = 1e-3,
+) -> WorkspaceHull:  # fmt: skip
+    """The hull of the positions where all of some kinds hold.
 
     Args:
-        question: The question; its grid gives the orientations only.
         robot: The robot, for its frame and motion.
+        about: What the kinds know of it.
+        kinds: Names of `KINDS`.
         center: Where rays begin, shape (3,) [m].
+        bound: Where rays end at the latest; None: as `hull_bound` says of the robot.
+        angles: Orientations, shape (k, 3) [rad]; None: unturned.
+        rule: "all" or "any" of the orientations.
         rays: How many, at most.
         tolerance: How near to the border of the workspace they end [m].
-        bound: Where rays end at the latest; None: as `hull_bound` says of the robot.
 
     Raises:
-        WorkspaceError: As `workspaces.hull.workspace_hull`, or the robot does not move in space.
+        WorkspaceError: As `workspaces.hull.workspace_hull`, a kind is known at the poses of its
+            grid only, or the robot does not move in space.
     """
+    for name in ("stable", SURVIVES):
+        if name in kinds:
+            raise WorkspaceError(f"hull: found kinds {name}; accepted: kinds other than that")
     if robot.motion_type().num_moves < 3:
         raise WorkspaceError(
             f"hull: found the planar {robot.name}; accepted: robots that move in space"
         )
+    rows = np.zeros((1, 3)) if angles is None else angles
+    turns = [rotation_from_angles(row).matrix() for row in rows]
+
+    def holds(positions: Array) -> np.ndarray:
+        n = len(positions)
+        each = [
+            np.all([KINDS[name].holds(about, at) for name in kinds], axis=0)
+            for at in (Poses(0, n, positions, np.tile(turn, (n, 1, 1))) for turn in turns)
+        ]
+        return np.asarray((np.all if rule == "all" else np.any)(each, axis=0))
+
     bound = hull_bound(robot) if bound is None else bound
+    endless = bound.kind == NOTHING
     return workspace_hull(
-        question_holds(question), center, bound.lower, bound.upper, rays=rays, tolerance=tolerance,
-        steps=FIRST_STEPS * (REACH if bound.kind == NOTHING else 1),
-        likely=(robot.frame.lower, robot.frame.upper) if bound.kind == NOTHING else None,
+        holds, np.asarray(center, float), bound.lower, bound.upper, rays=rays,
+        tolerance=tolerance, steps=FIRST_STEPS * (REACH if endless else 1),
+        likely=(robot.frame.lower, robot.frame.upper) if endless else None,
     )  # fmt: skip
 
 
-def hull_numbers(hull: WorkspaceHull, bound: HullBound | None = None) -> dict[str, Any]:
+def hull_numbers(hull: WorkspaceHull, bound: HullBound) -> dict[str, Any]:
     """Volume, area, centroid and what bounded it for JSON."""
     return {
-        **({} if bound is None else bound.as_dict()),
+        **bound.as_dict(),
         "center_m": hull.center.tolist(),
         "rays": len(hull.vertices),
         "rays_to_the_bound": int(np.count_nonzero(hull.cut)),
@@ -145,20 +137,10 @@ def hull_numbers(hull: WorkspaceHull, bound: HullBound | None = None) -> dict[st
     }
 
 
-def save_hull(hull: WorkspaceHull, folder: Path) -> Path:
-    """Writes `hull.npz` into a folder that exists, and returns its path."""
-    path = folder / HULL_ARRAYS
-    store_arrays(
-        path,
-        {
-            "center": hull.center,
-            "vertices": hull.vertices,
-            "faces": hull.faces,
-            "cut": hull.cut,
-            "tolerance": np.array(hull.tolerance),
-        },
-    )
-    return path
+def save_hull(hull: WorkspaceHull, folder: Folder) -> None:
+    """Writes `HULL_ARRAYS`."""
+    arrays = {name: np.asarray(getattr(hull, name)) for name in NAMES}
+    folder.write_arrays(HULL_ARRAYS, arrays)
 
 
 def load_hull(folder: Path) -> WorkspaceHull:
@@ -168,8 +150,7 @@ def load_hull(folder: Path) -> WorkspaceHull:
         DataFileError: There is no such file, or it is damaged.
     """
     arrays = load_arrays(folder / HULL_ARRAYS)
-    names = ("center", "vertices", "faces", "cut", "tolerance")
-    if arrays is None or not set(names) <= set(arrays):
+    if arrays is None or not set(NAMES) <= set(arrays):
         raise DataFileError(f"{folder / HULL_ARRAYS}: found no hull; accepted: a whole file")
-    center, vertices, faces, cut, tolerance = (arrays[name] for name in names)
+    center, vertices, faces, cut, tolerance = (arrays[name] for name in NAMES)
     return WorkspaceHull(center, vertices, faces, cut, float(tolerance))

@@ -1,6 +1,14 @@
-"""A workspace as grid, hull and boxes in the robot's scene, as a page for the browser."""
+"""Workspaces in the robot's scene, as a page for the browser that needs no server.
+
+Every workspace, the hull, and boxes by what is proven of them are entries below "workspaces" in
+the page's menu, where they can be shown and hidden. The robot is at home, with tensions that hold
+it under the limits, mass and wrench of the workspace; if none do, its cables are grey.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydrake.geometry import Rgba
@@ -8,15 +16,21 @@ from pydrake.geometry import Rgba
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.stability_scene import held_picture, home_tensions
-from cdpr_drake.analyses.workspaces.workspace_results import ALL, RobotWorkspace
+from cdpr_drake.analyses.workspaces.conditions import ALL
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import tension_problem
+from cdpr_drake.palette import WORKSPACES, Look, rgb
+from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.volume import surface_quads, triangles
+
+if TYPE_CHECKING:
+    from cdpr_drake.analyses.workspaces.stability import Stability
+    from cdpr_drake.analyses.workspaces.workspace_result import Workspace
 
 PAGE = "workspace.html"
 """The page."""
@@ -28,7 +42,7 @@ COLORS = (
     Rgba(0.80, 0.47, 0.65, 0.45),
     Rgba(0.60, 0.60, 0.60, 0.45),
 )
-"""Of what all kinds have in common, then of the kinds in turn."""
+"""Colours of what all kinds have in common, then of the kinds in turn."""
 
 HULL_COLOR = Rgba(0.48, 0.65, 0.85, 0.45)
 
@@ -42,49 +56,53 @@ VERDICTS = {
 }
 """Boxes by what is proven of them, and their colours."""
 
+STABILITY_COLORS = {
+    "SZ": Rgba(*rgb(WORKSPACES["SZ"]), 0.55),
+    "Z": Rgba(*rgb(WORKSPACES["Z"]), 0.45),
+    "S": Rgba(*rgb(WORKSPACES["S"]), 0.45),
+}
+"""Colours of kinds of stability; the first is visible, the others wait in the menu."""
 
-def workspace_page(
-    workspace: RobotWorkspace,
-    robot: Robot,
-    hull: WorkspaceHull | None = None,
-    boxes: CertifiedBoxes | None = None,
-) -> tuple[Pictures, str]:
-    """What writes the robot at home with its workspaces as one page; else why there is none.
+Mesh = tuple[Array, np.ndarray]
+"""Vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of what is empty."""
 
-    Every kind, the hull, and boxes by what is proven of them are entries below "workspaces" in the
-    page's menu, where they can be shown and hidden; what all kinds have in common is visible.
-    Cables have the tensions that hold the robot at home with the limits, mass and wrench of the
-    question; where none do, they are grey, and the words say why.
-    """
-    tensions, problem = home_tensions(workspace.arguments["statics"], robot)
-    note = f"the cables in {PAGE} are grey: {problem}" if problem else ""
-    try:
-        picture = held_picture(robot, tensions)
-    except CdprError as there:
-        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {there}"
-    about = workspace.arguments
-    picture.title = f"{about['robot']}: workspaces, {workspace.geometry}"
-    for number, (name, solid, color) in enumerate(workspace_solids(workspace)):
-        if len(solid[1]):
-            path = f"workspaces/{name}"
-            add_solid(picture.meshcat, path, *solid, color, visible=number == 0)
-    if hull is not None:
-        _add(picture, "workspaces/hull", *hull_solid(hull))
+
+class Solid(NamedTuple):
+    """A workspace as it is drawn, with its path below "workspaces"."""
+
+    path: str
+    mesh: Mesh
+    color: Rgba
+
+
+def workspace_page(workspace: Workspace, robot: Robot) -> tuple[Pictures, str]:
+    """What writes the page of a workspace, and what should be known of it."""
+    solids = [Solid(*parts) for parts in workspace_solids(workspace)]
+    if workspace.hull is not None:
+        solids.append(Solid("hull", *hull_solid(workspace.hull)))
+    if workspace.boxes is not None:
+        solids += [
+            Solid(f"boxes/{name}, {words}", mesh, color)
+            for name, words, mesh, color in box_solids(workspace.boxes)
+        ]
+    title = f"{workspace.arguments['robot']}: workspaces, {workspace.geometry}"
     if workspace.is_tilted():
-        picture.title = f"axes: {workspace.axes_words()}"
-    if boxes is not None:
-        for name, words, solid, color in box_solids(boxes):
-            _add(picture, f"workspaces/boxes/{name}, {words}", solid, color)
-    return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, note
+        title = f"axes: {workspace.axes_words()}"
+    return _page(robot, workspace.arguments["statics"], title, solids)
 
 
-def workspace_solids(
-    workspace: RobotWorkspace,
-) -> list[tuple[str, tuple[Array, np.ndarray], Rgba]]:
-    """What all kinds have in common, where there are several, and each kind: name, solid, colour.
+def stability_page(stability: Stability, robot: Robot) -> tuple[Pictures, str]:
+    """What writes the page of stability workspaces, and what should be known of it."""
+    solids = [
+        Solid(f"{name}/{kind}" if kind != "S" else "S", mesh, color)
+        for name, kind, mesh, color in stability_solids(stability)
+    ]
+    title = f"{robot.name}: stability of the servo, {stability.geometry}"
+    return _page(robot, stability.arguments["statics"], title, solids)
 
-    A solid is vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of an empty one.
-    """
+
+def workspace_solids(workspace: Workspace) -> list[tuple[str, Mesh, Rgba]]:
+    """What all kinds have in common, if there are several, and each kind."""
     names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
     return [
         (
@@ -96,36 +114,44 @@ def workspace_solids(
     ]
 
 
-def hull_solid(hull: WorkspaceHull) -> tuple[tuple[Array, np.ndarray], Rgba]:
-    """A hull as vertices and triangles, and its colour."""
+def stability_solids(stability: Stability) -> list[tuple[str, str, Mesh, Rgba]]:
+    """Bounds and kind of each workspace, and its mesh; S once, for the first bounds."""
+    return [
+        (
+            name,
+            kind,
+            triangles(surface_quads(stability.places(kind, name), stability.grid.axes)),
+            color,
+        )
+        for number, name in enumerate(stability.names)
+        for kind, color in STABILITY_COLORS.items()
+        if kind != "S" or number == 0  # the same for all bounds
+    ]
+
+
+def hull_solid(hull: WorkspaceHull) -> tuple[Mesh, Rgba]:
+    """A hull and its colour."""
     return (hull.vertices, hull.faces), HULL_COLOR
 
 
-def box_solids(
-    boxes: CertifiedBoxes,
-) -> list[tuple[str, str, tuple[Array, np.ndarray], Rgba]]:
-    """Boxes by what is proven of them: name of that, words, solid of the largest, colour.
+def box_solids(boxes: CertifiedBoxes) -> list[tuple[str, str, Mesh, Rgba]]:
+    """Boxes by what is proven of them: its name, how many, mesh of the largest, colour.
 
     A verdict without a box is left out.
     """
-    found = []
+    solids = []
     for name, (verdict, color) in VERDICTS.items():
-        some = np.flatnonzero(boxes.verdicts == verdict)
-        volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[some], axis=1)
-        largest = some[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
+        numbers = np.flatnonzero(boxes.verdicts == verdict)
+        volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[numbers], axis=1)
+        largest = numbers[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
         if len(largest):
-            words = f"the largest {len(largest)} of {len(some)}"
-            solid = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
-            found.append((name, words, solid, color))
-    return found
+            words = f"the largest {len(largest)} of {len(numbers)}"
+            mesh = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
+            solids.append((name, words, mesh, color))
+    return solids
 
 
-def _add(picture: RobotPicture, path: str, solid: tuple[Array, np.ndarray], color: Rgba) -> None:
-    """Adds triangles that wait in the menu."""
-    add_solid(picture.meshcat, path, *solid, color, visible=False)
-
-
-def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:
+def _cuboids(middles: Array, halves: Array) -> Mesh:
     """Vertices, shape (8 k, 3), and triangles, shape (12 k, 3), of boxes."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -133,3 +159,58 @@ def _cuboids(middles: Array, halves: Array) -> tuple[Array, np.ndarray]:
     vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
     faces = one + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
     return vertices, faces.reshape(-1, 3)
+
+
+def _page(
+    robot: Robot, statics: Mapping[str, Any], title: str, solids: Sequence[Solid]
+) -> tuple[Pictures, str]:
+    """The page, with the first solid visible; words if cables are grey, or if there is no page."""
+    tensions, problem = _home_tensions(statics, robot)
+    # Twice the largest tension is the end of the colours, which also tell home from full load.
+    most = 0.0 if problem else 2.0 * float(np.max(tensions))
+    try:
+        picture = RobotPicture(robot, most)
+        picture.draw(robot.home.transform(), tensions)
+    except CdprError as undrawn:
+        return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {undrawn}"
+    picture.title = title
+    for number, solid in enumerate(solids):
+        if len(solid.mesh[1]):
+            path = f"workspaces/{solid.path}"
+            add_solid(picture.meshcat, path, *solid.mesh, solid.color, visible=number == 0)
+            if number == 0:
+                picture.explain(f"workspace {solid.path}", Look(_hexadecimal(solid.color)))
+    note = f"{PAGE} shows the robot at home without tensions: {problem}" if problem else ""
+    return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, note
+
+
+def _hexadecimal(color: Rgba) -> str:
+    parts = (color.r(), color.g(), color.b())
+    return "#" + "".join(f"{round(255 * part):02x}" for part in parts)
+
+
+def _home_tensions(statics: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:
+    """Tensions of least 2-norm at home, shape (m,) [N]; NaN and the reason if there are none.
+
+    Args:
+        statics: Limits, mass and wrench as the arguments of a workspace have a `StaticCase`.
+        robot: The robot.
+    """
+    X_WP = robot.home.transform()
+    mass = statics["weight"] / robot.gravity if robot.gravity > 0.0 else None
+    limits = (statics["lower"][0], statics["upper"][0])
+    try:
+        problem = tension_problem(
+            robot, X_WP, np.array(statics["wrench"]), limits=limits, mass=mass,
+            cables=robot.cable_set(pulleys="pulley_radius" in statics["cables"]),
+        )  # fmt: skip
+        tensions = exact_tensions(problem)
+        if tensions is None:
+            place = ", ".join(f"{x:g}" for x in X_WP.translation())
+            raise InfeasibleTensionError(
+                f"no tensions within {limits[0]:g}..{limits[1]:g} N hold the platform at "
+                f"({place}) m"
+            )
+    except CdprError as refusal:
+        return np.full(len(robot.cables), np.nan), str(refusal)
+    return tensions, ""

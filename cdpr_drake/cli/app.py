@@ -35,11 +35,6 @@ LONGEST_LINE = 490
 BAD_INPUT = 2
 """Exit code when the user's input is not accepted."""
 
-OLD = (
-    "workspace", "stability",
-)  # fmt: skip
-"""Subcommands of the old app."""
-
 WIDEST = 100
 """Of the overview [characters]."""
 
@@ -180,10 +175,6 @@ def _main(given: Sequence[str], imported: Callable[[], None]) -> NoReturn:
     try:
         compile_ahead(given)
         share_compilation()
-        if given[0] in OLD:
-            from cdpr_drake.cli import old_app
-
-            old_app._main(given, imported)
         from cdpr_drake.cli.call import run  # and with it the parser
 
         sys.exit(run(given, imported))

@@ -119,6 +119,18 @@ COMMANDS = {
         ("cdpr equilibria grab_three --position 0.6,1.16,-1.5",
          "cdpr equilibria grab_four --position 0.6,1.16,-1.5 --taut C1,C2,C3"),
     ),
+    "workspace": Command(
+        _ANALYSE, f"{_VERBS}.workspaces.workspace:compute_workspace",
+        "Finds where a robot can work: kinds of workspaces, their intersection, and measures.",
+        ("cdpr workspace acrobot_large",
+         "cdpr workspace acrobot_large --kind static,interference-free --certify"),
+    ),
+    "stability": Command(
+        _ANALYSE, f"{_VERBS}.workspaces.stability:assess_stability",
+        "Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).",
+        ("cdpr stability acrobot_large", "cdpr stability acrobot_large --scheme pbvs --json"),
+        {"along": f"{_VERBS}.simulation.stability_files:assess_run"},
+    ),
     "plan": Command(
         _PLAN, f"{_VERBS}.planning.command:plan",
         "Plans a motion within limits of tensions and winches: on a path, a free one, or a proven "

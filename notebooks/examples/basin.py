@@ -12,10 +12,11 @@ import pandas as pd
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.jobs import finished_jobs
-from cdpr_drake.analyses.workspaces import CameraTask, make_question
+from cdpr_drake.analyses.workspaces import ServoView, robot_stability, static_case
 from cdpr_drake.geometry import pose_rows
 from cdpr_drake.stability import FixedObject, verdict
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
+from cdpr_drake.workspaces.pose_grid import grid_by_count
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 
 LOW, HIGH = [-0.48, -0.48, 0.15, -30, -30, -90], [0.48, 0.48, 1.1, 30, 30, 90]  # [m, deg]
@@ -34,23 +35,24 @@ def run_block(block, count=20):
     scenario = cdpr.load_scenario("acrobot_pbvs", [*CHANGES, f"controller.scheme={scheme}"])
     robot, target = cdpr.load_robot(scenario.robot), scenario.target.target()
     X_PC, X_WO = robot.camera_mount("onboard").pose.transform(), scenario.target.pose.transform()
-    task = CameraTask(FixedObject(X_WO, scenario.desired.transform()), X_PC)
-    question = make_question(robot, scheme=scheme, task=task)
-    pinhole, bounds = servo_pinhole(scenario.camera, robot), question.bounds["baseline"]
+    view = ServoView(FixedObject(X_WO, scenario.desired.transform()), X_PC)
+    grid = grid_by_count(robot.frame.lower, robot.frame.upper, (1, 1, 1))
+    servo = robot_stability(robot, grid, view, scheme=scheme)
+    statics, pinhole = static_case(robot), servo_pinhole(scenario.camera, robot)
     rows = []
     for seed in range(first, first + count):
         numbers = np.random.default_rng(seed).uniform(LOW, HIGH)
         start = cdpr.Pose(position=numbers[:3], angles_deg=numbers[3:])
         X_WP = start.transform()
         R = X_WP.rotation()
-        held = statically_feasible(question.statics, X_WP.translation(), R.matrix())[0]
+        held = statically_feasible(statics, X_WP.translation(), R.matrix())[0]
         if not held or not target.in_view((X_WP @ X_PC).inverse() @ X_WO, pinhole):
             continue
         with suppress(cdpr.CdprError):  # elastic cables do not hold the platform
             run = cdpr.simulate(replace(scenario, initial_pose=start, seed=seed))
             row = {"scheme": scheme, "outcome": run.numbers["outcome"]}
             row["turn"] = f"from {np.degrees(R.ToAngleAxis().angle()) // 30 * 30:.0f} deg"
-            verdicts = verdict.judge_all_verdicts(question.case, bounds, pose_rows([X_WP]))
+            verdicts = verdict.judge_all_verdicts(servo.case, servo.bounds, pose_rows([X_WP]))
             rows.append(row | {name: 100.0 * each.stable[0] for name, each in verdicts.items()})
     return rows
 

@@ -74,3 +74,6 @@ if __name__ == "__main__":
 
 STORE = "cdpr_drake.analyses.sweeps.folder.SweepFolder.store"
 """Keeps a chunk of a sweep."""
+
+STORE_ARRAYS = "cdpr_drake.analyses.frame.folder.Folder.write_arrays"
+"""Keeps a chunk of a grid."""

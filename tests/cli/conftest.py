@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.front import simulation, stability, workspaces
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 
 
@@ -20,9 +21,16 @@ def only(*endings):
         kept = {name: draw for name, draw in pictures.items() if name.endswith(endings)}
         return write_pictures(folder, kept, *more)
 
+    write_files = Folder.write_all
+
+    def write_all(folder, writers, *more):
+        kept = {name: draw for name, draw in writers.items() if name.endswith(endings)}
+        return write_files(folder, kept, *more)
+
     with pytest.MonkeyPatch.context() as patch:
-        for module in (simulation, stability, workspaces):
+        for module in (simulation,):
             patch.setattr(module, "write_pictures", write)
+        patch.setattr(Folder, "write_all", write_all)
         yield
 
 

@@ -12,17 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
-from cdpr_drake.analyses.workspaces.workspace_hulls import question_hull
-from cdpr_drake.analyses.workspaces.workspace_question import make_workspace_question
-from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions, static_case
+from cdpr_drake.analyses.workspaces.workspace_hulls import robot_hull
+from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces import box_judges
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OUTSIDE
 from cdpr_drake.workspaces.box_grid_agreement import hull_agreement
-from cdpr_drake.workspaces.pose_grid import grid_by_count
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.cli.commands import answer, run, told
 from tests.cli.conftest import only
@@ -33,17 +32,6 @@ pytestmark = pytest.mark.usefixtures("here")
 ROOT = Path(__file__).parents[2]
 ONE = ("--workers", "1")
 PLANAR = ("workspace", "planar", "--grid", "5,5,1", *ONE)
-
-
-@pytest.mark.usefixtures("no_room_for_pictures")
-def test_pictures_that_fail_cost_nothing_else(capsys, here):
-    code, _, err = run(capsys, *PLANAR, "--out", "found")
-    assert code == 3
-    for name in ("planes.png", "workspace.html"):
-        assert f"{name}: not written: [Errno 28]" in err
-    assert "The data is complete" in err
-    assert json.loads((here / "found" / "results.json").read_text())
-    assert not [path for path in here.rglob("*") if path.suffix in (".png", ".html")]
 
 
 def test_kinds_measures_and_hull_of_one_robot(capsys, here):
@@ -61,14 +49,14 @@ def test_kinds_measures_and_hull_of_one_robot(capsys, here):
     pictures = ("planes.png", "capacity-margin.png", "clearance.png", "workspace.html")
     for name in (*pictures, "hull.npz"):
         assert (out / name).stat().st_size > 1000
-    stored = load_robot_workspace(out)
+    stored = load_workspace(out)
     margins = stored.values["capacity-margin"]
     np.testing.assert_array_equal(margins >= 0.0, stored.holds["static"])
-    with only():
+    with only("boxes.png"):
         code, said, err = run(capsys, *asked)
-    assert code == 0
-    assert "complete already" in err
+    assert (code, "reused the grid of found" in err) == (0, True)
     assert "statically-stable" in said
+    assert "grid: 5 x 5 x 2 positions, from (-0.48, -0.48, 0)" in said
 
 
 def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(capsys, here):
@@ -93,32 +81,6 @@ def test_a_planar_robot_with_certified_boxes_and_a_range_of_turns(capsys, here):
             assert agreeing["contradictions"] == 0
             assert agreeing["in_boxes_proven_inside"] + agreeing["in_boxes_proven_outside"] > 0
     assert shares["all"] < shares["any"]
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_dynamic_and_closure_kinds(capsys):
-    kinds = "dynamic,wrench-closure,singularity-free,collision-free,static"
-    asked = (
-        "workspace", "acrobot_fully_constrained", "--kind", kinds, "--acceleration", "0.5,1",
-        "--velocity", "0,0,1", "--grid", "5,5,3", *ONE, "--limits", "0.5,60",
-    )  # fmt: skip
-    found = told(capsys, *asked)["workspaces"]
-    assert found["dynamic"]["poses"] <= found["static"]["poses"]
-    assert set(found) == {*kinds.split(","), "all"}
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_files_of_wrenches_and_obstacles(capsys, here):
-    (here / "wrenches.yaml").write_text("vertices: [[0, 0, 0, 5, 0, 0], [0, 0, 0, -5, 0, 0]]\n")
-    boxes = "boxes:\n  - {pose: {position: [0.2, 0.2, 0.3]}, size: [0.2, 0.2, 0.2]}\n"
-    (here / "boxes.yaml").write_text(boxes)
-    found = told(
-        capsys, "workspace", "planar", "--grid", "9,9,1", *ONE, "--kind",
-        "wrench-feasible,collision-free", "--wrench-set", "wrenches.yaml",
-        "--obstacles", "boxes.yaml",
-    )["workspaces"]  # fmt: skip
-    assert 0 < found["collision-free"]["poses"] < 81
-    assert 0 < found["wrench-feasible"]["poses"] < 81
 
 
 @pytest.mark.parametrize(("robot", "pose"), [("acrobot_large", "0,0,0.3"), ("planar", "0.1,0,0.3")])
@@ -213,9 +175,7 @@ def test_several_kinds_are_proven_at_once_among_convex_obstacles(capsys, here):
 
 def planar_search():
     robot = load_robot("planar")
-    point = [0.0, 0.0, robot.plane_height]
-    grid = grid_by_count(point, point, (1, 1, 1))
-    return box_search(make_workspace_question("planar", ["static"], grid), robot)
+    return box_search(robot, pose_conditions(robot), ["static"], np.zeros((1, 3)))
 
 
 MOST = 1500
@@ -225,13 +185,14 @@ MOST = 1500
 def test_a_search_for_boxes_goes_on_after_kill(tmp_path):
     """kill -9 in the middle loses seconds at most; the next search ends as one that was not."""
     script = "from tests.cli.test_cli_workspace import killed_search as s; s"
-    words = [sys.executable, "-c", f"{script}({str(tmp_path)!r})"]
+    words = [sys.executable, "-c", f"{script}({str(tmp_path / 'out')!r})"]
     done = subprocess.run(words, capture_output=True, check=False, cwd=ROOT)
     assert done.returncode == -signal.SIGKILL, done.stderr
-    with np.load(tmp_path / "boxes_journal.npz") as stored:
+    with np.load(tmp_path / "out" / "boxes_journal.npz") as stored:
         assert 0 < len(stored["verdicts"]) < MOST
     search = planar_search()
-    whole, continued = certified_boxes(search, MOST), certified_boxes(search, MOST, tmp_path)
+    with Folder(tmp_path / "out", {"boxes": True}) as folder:
+        whole, continued = certified_boxes(search, MOST), certified_boxes(search, MOST, folder)
     for name in ("poses", "halves", "verdicts", "curve"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(continued, name))
 
@@ -245,7 +206,8 @@ def killed_search(folder):
         if judged > MOST / 2:
             os.kill(os.getpid(), signal.SIGKILL)
 
-    certified_boxes(planar_search(), MOST, Path(folder), on_progress=die)
+    with Folder(Path(folder), {"boxes": True}) as kept:
+        certified_boxes(planar_search(), MOST, kept, on_progress=die)
 
 
 @pytest.mark.usefixtures("without_pictures")
@@ -271,10 +233,9 @@ def test_a_broken_proof_is_reported_loudly(capsys, here, monkeypatch):
 def hull_and_boxes():
     """Of ACROBOT."""
     robot = load_robot("acrobot_large")
-    grid = grid_by_count([0, 0, 0.3], [0, 0, 0.3], (1, 1, 1))
-    question = make_workspace_question("acrobot_large", ["static"], grid)
-    hull = question_hull(question, robot, np.array([0.0, 0.0, 0.3]), 200)
-    return hull, certified_boxes(box_search(question, robot), 4000)
+    about = pose_conditions(robot)
+    hull = robot_hull(robot, about, ["static"], (0.0, 0.0, 0.3), rays=200)
+    return hull, certified_boxes(box_search(robot, about, ["static"], np.zeros((1, 3))), 4000)
 
 
 @pytest.mark.parametrize("verdict", [INSIDE, OUTSIDE])
@@ -314,14 +275,10 @@ def test_pulleys_are_in_grid_and_proof_and_said_first(capsys, here):
     for k, more in enumerate(((), ("--no-pulleys",))):
         asked = ("workspace", "caroca", "--grid", "7,7,5", *ONE, "--certify", "--boxes", "1500")
         with only("workspace.html"):
-            asked += ("--limits", "30,10000", "--out", f"{k}", "--json", *more)
-            code, out, err = run(capsys, *asked)
-        assert code == 0
-        one = json.loads(out)
+            one = told(capsys, *asked, "--limits", "30,10000", "--out", f"{k}", *more)
         found.append(one)
-        holds.append(load_robot_workspace(here / f"{k}").holds["static"])
+        holds.append(load_workspace(here / f"{k}").holds["static"])
         assert next(iter(one)) == "cables"
-        assert f"caroca: {one['geometry']}" in err
         assert one["agreement"]["grid"]["contradictions"] == 0
         assert one["agreement"]["grid"]["in_boxes_proven_inside"] > 0
         page = (here / f"{k}" / "workspace.html").read_text()
@@ -331,7 +288,7 @@ def test_pulleys_are_in_grid_and_proof_and_said_first(capsys, here):
         ("without pulleys: from fixed exit points", "pulleys ignored", "from fixed exit points"),
     ]
     case = static_case(load_robot("caroca"), (30.0, 10_000.0), pulleys=True)
-    grid = load_robot_workspace(here / "0").grid
+    grid = load_workspace(here / "0").grid
     feasible = statically_feasible(case, grid.positions(), grid.rotations())
     np.testing.assert_array_equal(holds[0].ravel(), feasible)
     assert np.any(holds[0] != holds[1])
@@ -370,7 +327,7 @@ def test_an_assumed_frame_bounds_no_hull(capsys, here):
     assert hulls["box"]["volume_m3"] == pytest.approx(0.2**3, rel=0.2)
     beyond = ("--grid", "2,2,2", "--box", "9:10,9:10,9:10", *ONE)
     assert told(capsys, "workspace", "toy.yaml", *beyond)["workspaces"]["static"]["poses"] == 0
-    grid = load_robot_workspace(here / "box").grid
+    grid = load_workspace(here / "box").grid
     for axis, (low, high) in zip(grid.axes, small, strict=True):
         np.testing.assert_allclose(axis[[0, -1]], (low, high), atol=1e-5)
 

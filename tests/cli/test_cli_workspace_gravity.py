@@ -7,7 +7,7 @@ import pytest
 import yaml
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
+from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from tests.cli.commands import answer, ended, run, told
@@ -51,7 +51,7 @@ def held(robot, position, gravity):
 
 def test_verdicts_are_those_of_the_tilted_weight(tilted):
     path, _, folder = tilted
-    robot, found = load_robot(str(path)), load_robot_workspace(folder)
+    robot, found = load_robot(str(path)), load_workspace(folder)
     places = found.places("static")
     verdicts, upright = (
         np.array([
@@ -125,7 +125,7 @@ def test_a_level_plane_carries_what_of_the_weight_is_across_it(here, capsys):
 
 def test_the_page_of_an_upright_robot_has_no_title(tilted):
     """The title of the page is for what is out of the ordinary."""
-    found = load_robot_workspace(tilted[2])
+    found = load_workspace(tilted[2])
     found.arguments["statics"]["down"] = [0.0, 0.0, -1.0]
     pages, _ = workspace_page(found, small_robot("upright_body"))
     pages["workspace.html"](tilted[2] / "upright.html")

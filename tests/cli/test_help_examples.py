@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from cdpr_drake.cli.command_help import COMMANDS as OLD
 
 import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.command_help import COMMANDS as OLD
 from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
 from tests.analyses.logs.recorders import hangprinter_script, motive
 from tests.cli.commands import refuse
@@ -30,8 +30,8 @@ LONG_WORK = {
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],
     "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
-    "workspace": [SESSION],
-    "stability": [SESSION],
+    "workspace": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
+    "stability": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
     "plan": [
         "cdpr_drake.analyses.planning.free_plan.solve_free_motion",
         "cdpr_drake.analyses.planning.proven_plan.ProvenSets.find",

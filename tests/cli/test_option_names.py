@@ -8,10 +8,10 @@ from cdpr_drake.analyses.front.simulated_fits import (
     identify_in_simulation,
 )
 from cdpr_drake.analyses.front.simulation import simulate
-from cdpr_drake.analyses.front.workspaces import compute_workspace
 from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
+from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.simulate import PYTHON_NAMES
 from cdpr_drake.errors import CdprError
@@ -38,8 +38,8 @@ NOWHERE = "192.0.2.1"
          "workers: tcp://127.0.0.1:1 does not answer",
          "--workers: tcp://127.0.0.1:1 does not answer"),
         (lambda: compute_workspace("planar", grid=(2, 2, 1), workers="tcp://127.0.0.1:1"),
-         ["workspace", "planar", "--grid", "2,2,1", "--scheduler", "tcp://127.0.0.1:1"],
-         "leave out workers", "leave out --scheduler"),
+         ["workspace", "planar", "--grid", "2,2,1", "--workers", "tcp://127.0.0.1:1"],
+         "workers: tcp://127.0.0.1:1 does not answer", "--workers: tcp://127.0.0.1:1 does not"),
         (lambda: open_meshcat(port=1), ["view", "planar", "--port", "1"],
          "port: found 1;", "--port: found 1;"),
         (lambda: open_meshcat(NOWHERE),

@@ -235,7 +235,6 @@ REFUSED = {
         ("--box 0:1,0:1,0:inf", "--box", "inf"),
         ("--box -1e308:1e308,0:1,0:1", "--box", "1e+06"),
         ("--box 0:1,0:1,nan:1", "--box", "nan"),
-        ("--box 5:6,0:1,0:1 --grid 3,3,1", "grid", "frame of planar"),
         ("--unbounded", "--unbounded", "--hull"),
         ("--unbounded --hull 0,0,0.3 --box 0:1,0:1,0:1", "--unbounded", "--box"),
         ("--method closed", "closed", "closed_form"),
@@ -251,6 +250,10 @@ REFUSED = {
         ("--orientation 0,0", "--orientation"),
         ("--orientation 0,0,0:360:0.001", "--orientation", "10000"),
         ("--mass 0", "--mass"),
+        ("--workers 2", "--workers", "multiple times"),
+    ],
+    "workspace planar": [
+        ("--box 5:6,0:1,0:1 --grid 3,3,1", "grid", "frame of planar"),
         ("--workers 0", "--workers"),
     ],
     "workspace acrobot_large": [("--grid 3,3,3 --hull 0,0,1.19", "such as (")],
@@ -273,7 +276,7 @@ REFUSED = {
          "grid", "x from 5 to 6", "(-0.6, -0.6, 0) to (0.6, 0.6, 1.2)"),
         ("planar --mass -1", "--mass: found -1", ">= 0 [kg]"),
         ("planar --draws many", "--draws", "'many'", "see cdpr stability --help"),
-        ("", "Missing argument 'robot'; see cdpr stability --help"),
+        ("", "ROBOT: found nothing; accepted: a value; see cdpr stability --help"),
         ("README.md", "'README.md'", "has to end in .yaml"),
         ("planar --bounds list.yaml", "list.yaml", "r_bp, d_theta_bp_deg, r_pc"),
         ("planar --vary r_A", "--vary", "name=value"),
@@ -281,14 +284,14 @@ REFUSED = {
         ("planar --vary r_A=x", "--vary"),
         ("planar --bounds nothing.yaml", "nothing.yaml", "no such file"),
         ("planar --orientation 1,2", "--orientation", "phi,theta,psi"),
-        ("planar --workers 0", "--workers", "at least 1"),
+        ("planar --workers 0", "--workers", "1 to 4096"),
         ("acrobot_large --scenario acrobot_moving_tag", "target.motion", "rests"),
         ("planar --draws 0", "draws", "at least 1"),
         ("planar --searches -1", "searches", "found -1", "at least 1"),
         ("planar --pieces 0", "pieces", "found 0", "at least 1"),
         ("planar --verdict guessed", "verdict", "sampled"),
-        (f"planar --scheduler {NOBODY}", NOBODY, "this machine"),
-        ("acrobot_large --grid 2,2,2 --out there --format pgn", BAD_FORMAT),
+        (f"planar --workers {NOBODY}", NOBODY, "does not answer"),
+        ("acrobot_large --grid 2,2,2 --out there --figure-format pgn", "--figure-format", "'pgn'"),
     ],
     "study": [
         *((f"{name} --quick --workers {NOBODY}", NOBODY)
@@ -363,7 +366,8 @@ def held(root):
 @pytest.mark.parametrize(("line", "words"), ROWS, ids=[line[:70] for line, _ in ROWS])
 def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    for module in ("analyses.sweeps.workers", "analyses.frame.cluster"):
+        monkeypatch.setattr(f"cdpr_drake.{module}.SCHEDULER_TIMEOUT", 0.3)
     before = held(folder)
     said = refuse(capsys, *shlex.split(line))
     for word in words:

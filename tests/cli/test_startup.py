@@ -72,7 +72,7 @@ found["tension"] = {
     "own": sum(name.startswith("cdpr_drake") for name in sys.modules),
 }
 import cdpr_drake.analyses.workspaces.workspace_scene
-import cdpr_drake.cli.workspace
+import cdpr_drake.analyses.workspaces.workspace
 found["servos"] = [name for name in sys.modules if name.endswith("visual_servo_scenario")]
 end(["view", "planar", "--html", "robot.html"])
 import cdpr_drake.cli.call as call

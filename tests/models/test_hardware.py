@@ -7,7 +7,7 @@ from pydrake.geometry import Cylinder, Mesh, Role, SceneGraph, Sphere
 from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
-from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies
 from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.cables.models import check_breaking
 from cdpr_drake.errors import CableGeometryError, RobotFileError

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.front.workspaces import compute_workspace
 from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_statics import wrench_balance

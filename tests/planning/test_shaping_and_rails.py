@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.input_shaping import SHAPERS, make_shaper, shaped_share
 from cdpr_drake.planning.reconfiguration import Rails, RailTask, ReconfigurationProgram

@@ -8,8 +8,8 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.studies.perturbed_servo import Perturbation, perturbed_servo
+from cdpr_drake.analyses.workspaces.servo_stability import varied
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds
-from cdpr_drake.analyses.workspaces.stability_question import varied
 from cdpr_drake.errors import CdprError, StabilityError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions

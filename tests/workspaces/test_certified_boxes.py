@@ -7,17 +7,14 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.workspaces.box_certificates import (
     box_search,
     certified_boxes,
     load_boxes,
     save_boxes,
 )
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceRequest,
-    interference_bodies,
-    make_workspace_question,
-)
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
@@ -26,7 +23,6 @@ from cdpr_drake.workspaces.box_refinement import PathTube, refine
 from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, box_row, clearances
 from cdpr_drake.workspaces.certified_boxes import BoxJournal, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from tests.workspaces.workspace_cases import (
     DrakeScene,
     box,
@@ -290,12 +286,8 @@ def test_a_search_can_be_stopped():
 def test_boxes_of_several_kinds_are_those_of_each():
     robot, _ = robot_case("acrobot_large")
     kinds = ["static", "interference-free", "collision-free"]
-    axes = tuple(np.linspace(a, b, 3) for a, b in zip(*robot.reach(), strict=True))
-    request = WorkspaceRequest(around=interference_bodies(robot, obstacles()))
-    question = make_workspace_question(
-        robot, kinds, WorkspaceGrid(axes, np.zeros((1, 3))), asked=request
-    )
-    search = box_search(question, robot)
+    about = pose_conditions(robot, around=interference_bodies(robot, obstacles()))
+    search = box_search(robot, about, kinds, np.zeros((1, 3)))
     boxes = certified_boxes(search, 4000)
     assert min(check(boxes, search.tasks)) > 50
     verdicts = [
@@ -310,13 +302,12 @@ def test_boxes_of_several_kinds_are_those_of_each():
 
 def test_a_search_of_several_kinds_goes_on_where_it_was_stopped(tmp_path):
     robot, _ = robot_case("planar")
-    axes = tuple(np.array([x]) for x in (0.0, 0.0, robot.plane_height))
-    grid = WorkspaceGrid(axes, np.zeros((1, 3)))
-    question = make_workspace_question(robot, ["static", "collision-free"], grid)
-    search = box_search(question, robot)
+    kinds = ["static", "collision-free"]
+    search = box_search(robot, pose_conditions(robot), kinds, np.zeros((1, 3)))
     whole = certified_boxes(search, 2500)
-    certified_boxes(search, 1000, tmp_path)
-    same(whole, certified_boxes(search, 2500, tmp_path))
+    with Folder(tmp_path, {}) as folder:
+        certified_boxes(search, 1000, folder)
+        same(whole, certified_boxes(search, 2500, folder))
 
 
 def test_boxes_that_are_read_again_are_refined_as_they_were(tmp_path):
@@ -324,12 +315,13 @@ def test_boxes_that_are_read_again_are_refined_as_they_were(tmp_path):
     tasks = [task, replace(task, kind=STATIC)]
     boxes = certify(tasks, whole, 1000)
     assert np.any(boxes.proven[boxes.verdicts == OPEN])
-    save_boxes(boxes, tmp_path)
-    read = load_boxes(tmp_path, boxes.finished)
-    np.testing.assert_array_equal(read.proven, boxes.proven)
-    same(refine(boxes, tasks, whole, 1000), refine(read, tasks, whole, 1000))
-    save_boxes(certify(task, whole, 100), tmp_path)
-    assert load_boxes(tmp_path, True).proven is None
+    with Folder(tmp_path, {}) as folder:
+        save_boxes(boxes, folder)
+        read = load_boxes(tmp_path, boxes.finished)
+        np.testing.assert_array_equal(read.proven, boxes.proven)
+        same(refine(boxes, tasks, whole, 1000), refine(read, tasks, whole, 1000))
+        save_boxes(certify(task, whole, 100), folder)
+        assert load_boxes(tmp_path, True).proven is None
 
 
 @pytest.mark.parametrize("several", [False, True])

@@ -10,7 +10,7 @@ from scipy.optimize import lsq_linear
 from scipy.spatial import KDTree
 
 from cdpr_drake.analyses.workspaces.pose_grid import plain
-from cdpr_drake.analyses.workspaces.workspace_question import interference_bodies
+from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import rotation_from_angles

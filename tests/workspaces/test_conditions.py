@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import SpatialInertia, UnitInertia
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.control.task_space import PlatformDynamics, TaskGains, computed_torque
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles

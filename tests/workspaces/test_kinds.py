@@ -5,11 +5,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.workspaces.conditions import OF_POSES
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceRequest,
-    make_workspace_question,
-)
+from cdpr_drake.analyses.workspaces.conditions import OF_POSES, conditions_at
+from cdpr_drake.analyses.workspaces.robot_conditions import grid_conditions
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.pose_grid import grid_by_count
@@ -28,8 +25,9 @@ robots = pytest.mark.parametrize("robot", ["caroca_gazebo", "planar"])
 def holds(robot, kinds, **request):
     """Where kinds hold over a robot's frame, by kind, shape (n,)."""
     grid = grid_by_count(*load_robot(robot).reach(), POINTS)
-    question = make_workspace_question(robot, kinds, grid, asked=WorkspaceRequest(**request))
-    return {kind: inside.astype(bool) for kind, inside in question.task()(0, grid.size).items()}
+    about = grid_conditions(robot, kinds, (), grid, **request)
+    arrays = conditions_at(about, grid, kinds, 0, grid.size)
+    return {kind: inside.astype(bool) for kind, inside in arrays.items()}
 
 
 def is_within(inner, outer):

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.models.robot_statics import tension_problem

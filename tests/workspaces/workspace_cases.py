@@ -19,7 +19,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot

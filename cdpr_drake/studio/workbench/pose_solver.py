@@ -12,7 +12,7 @@ from cdpr_drake.analyses.statics.robot_at_rest import RobotAtRest
 from cdpr_drake.analyses.statics.static import solve_static
 from cdpr_drake.analyses.tensions import applicable_methods, solve_tensions
 from cdpr_drake.analyses.workspaces.conditions import MEASURES, PoseConditions, Poses
-from cdpr_drake.analyses.workspaces.workspace_question import pose_conditions
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_schema import Robot

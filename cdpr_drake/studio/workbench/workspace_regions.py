@@ -12,11 +12,16 @@ from pydrake.geometry import Meshcat, Rgba
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.analyses.workspaces.box_certificates import load_boxes
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
-from cdpr_drake.analyses.workspaces.stability_results import KINDS, load_workspaces
-from cdpr_drake.analyses.workspaces.stability_scene import stability_solids
+from cdpr_drake.analyses.workspaces.servo_stability import KINDS
+from cdpr_drake.analyses.workspaces.stability import load_stability
 from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
-from cdpr_drake.analyses.workspaces.workspace_results import load_robot_workspace
-from cdpr_drake.analyses.workspaces.workspace_scene import box_solids, hull_solid, workspace_solids
+from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import (
+    box_solids,
+    hull_solid,
+    stability_solids,
+    workspace_solids,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
@@ -120,7 +125,7 @@ def read_regions(folder: Path) -> Regions:
 
 
 def _of_workspace(folder: Path, told: dict[str, Any]) -> Regions:
-    found = load_robot_workspace(folder)
+    found = load_workspace(folder)
     layers = [
         _layer(name, told["workspaces"][name]["title"], found.volume(name), solid, color)
         for name, solid, color in workspace_solids(found)
@@ -157,7 +162,7 @@ def _box_layers(folder: Path, finished: bool) -> list[Layer]:
 
 
 def _of_stability(folder: Path, told: dict[str, Any]) -> Regions:
-    found = load_workspaces(folder)
+    found = load_stability(folder)
     layers = []
     for bounds, kind, solid, color in stability_solids(found):
         title = KINDS[kind] if kind == "S" else f"{KINDS[kind]}, bounds {bounds}"

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.design.rails import RailSettings, put_rails
 from cdpr_drake.analyses.design.reconfiguration import reconfigure
-from cdpr_drake.analyses.workspaces.static_feasible import static_case
+from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.models.robot_loader import load_robot

@@ -14,9 +14,9 @@ from cdpr_drake.analyses.studies.control_stability_figures import reasons, recip
 from cdpr_drake.analyses.studies.facts import facts_of, judged
 from cdpr_drake.analyses.studies.recipe_variants import IN_USE, RECIPES
 from cdpr_drake.analyses.studies.rows import digest
+from cdpr_drake.analyses.studies.stability_recipe import SampledTask
 from cdpr_drake.analyses.studies.stability_tables import BY_NAME, TABLES
 from cdpr_drake.analyses.studies.study import Form, StudyResult
-from cdpr_drake.analyses.workspaces.stability_tasks import SampledTask
 
 MET = "met (fitted)"
 

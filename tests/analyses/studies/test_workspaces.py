@@ -6,9 +6,10 @@ import pytest
 
 from cdpr_drake.analyses.studies.workspaces import (
     FIGURE,
-    kinds_question,
+    frame_grid,
     platforms_differ,
     pose_shares,
+    possible_kinds,
     remains_large,
     static_row,
 )
@@ -55,10 +56,11 @@ def test_half_as_many_cells_are_every_second_point():
 
 
 def test_a_robot_without_a_camera_is_asked_for_all_but_what_a_camera_sees():
-    question, left_out = kinds_question("caroca_gazebo", (3, 3, 3))
-    assert set(OF_POSES) - set(question.kinds) == set(left_out) == {"target-visible"}
+    grids = {name: frame_grid(name, (3, 3, 3)) for name in ("caroca_gazebo", "planar")}
+    _, kinds, _, left_out = possible_kinds("caroca_gazebo", grids["caroca_gazebo"])
+    assert set(OF_POSES) - set(kinds) == set(left_out) == {"target-visible"}
     assert left_out["target-visible"].startswith("caroca_pbvs.yaml: camera.mount")
-    assert kinds_question("planar", (3, 3, 3))[1] == {}
+    assert possible_kinds("planar", grids["planar"])[3] == {}
 
 
 def test_shares_are_those_of_the_poses():

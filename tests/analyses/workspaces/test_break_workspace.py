@@ -9,8 +9,7 @@ from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
-from cdpr_drake.analyses.workspaces.break_figures import breaks_figure
-from cdpr_drake.analyses.workspaces.workspace_figures import planes_figure
+from cdpr_drake.analyses.workspaces.workspace_figures import breaks_figure, planes_figure
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import StoppedError, WorkspaceError
 from cdpr_drake.models.robot_loader import load_robot
@@ -20,7 +19,7 @@ from tests.messages import printed
 
 AFTER, REACTIONS = 0.2, ["stop", "redistribute"]
 GRID = grid_by_count(np.array([0.0, 0.0, 0.35]), np.array([0.1, 0.0, 0.35]), (2, 1, 1))
-ASKED = {"grid": GRID, "reactions": REACTIONS, "after": AFTER}
+ASKED = {"grid": GRID, "reactions": REACTIONS, "after": AFTER, "workers": 1}
 
 
 @pytest.fixture(scope="module")
@@ -28,17 +27,10 @@ def folder(tmp_path_factory):
     """Stopped after the first pose, and continued."""
     where = tmp_path_factory.mktemp("breaks") / "found"
     seen = []
-
-    class Impatient(cdpr.Session):
-        def progress(self, progress):
-            seen.append(progress.done)
-
-        def stop(self):
-            return bool(seen) and seen[-1] >= 1
-
+    follow = cdpr.Follow(seen.append, stop=lambda: bool(seen) and seen[-1].done >= 1)
     with pytest.raises(StoppedError, match="after 1 of 2 poses"):
         cdpr.compute_workspace(
-            "acrobot_large", "dynamic-single-failure", folder=where, session=Impatient(), **ASKED
+            "acrobot_large", "dynamic-single-failure", folder=where, follow=follow, **ASKED
         )
     return where
 
@@ -46,15 +38,11 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(folder):
     seen = []
-
-    class Watching(cdpr.Session):
-        def progress(self, progress):
-            seen.append(progress.found)
-
     result = cdpr.compute_workspace(
-        "acrobot_large", "dynamic-single-failure", folder=folder, session=Watching(), **ASKED
-    )
-    assert seen[-1] == 1  # of the two poses one was there
+        "acrobot_large", "dynamic-single-failure", folder=folder, follow=cdpr.Follow(seen.append),
+        **ASKED,
+    )  # fmt: skip
+    assert seen[-1].found == 1  # of the two poses one was there
     return result
 
 

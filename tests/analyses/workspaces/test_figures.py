@@ -15,21 +15,17 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from cdpr_drake.analyses.studies.control_stability_figures import table_figure
 from cdpr_drake.analyses.studies.stability_tables import BY_NAME
 from cdpr_drake.analyses.visualization.replay import robot_picture
+from cdpr_drake.analyses.workspaces.plane_panels import even_choice
+from cdpr_drake.analyses.workspaces.stability import Stability
 from cdpr_drake.analyses.workspaces.stability_figures import (
     COLORS,
     MOST_PLANES,
     curves_figure,
-    even_choice,
     solids_figure,
 )
 from cdpr_drake.analyses.workspaces.stability_figures import planes_figure as stability_planes
-from cdpr_drake.analyses.workspaces.stability_results import StabilityWorkspaces
+from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.analyses.workspaces.workspace_figures import OUTSIDE, planes_figure
-from cdpr_drake.analyses.workspaces.workspace_question import (
-    WorkspaceRequest,
-    make_workspace_question,
-)
-from cdpr_drake.analyses.workspaces.workspace_results import robot_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.stability.verdict import VERDICTS
@@ -37,7 +33,7 @@ from cdpr_drake.workspaces.pose_grid import grid_by_count
 from tests.figure_faults import figure_faults
 
 
-def workspaces(counts, stable=True, feasible=True, values=()):
+def workspaces(counts, stable=True, feasible=True, values=(), robot=None):
     """A result that was not computed; `values` are those of r_A [m] beside the baseline."""
     grid = grid_by_count([-0.5, -0.5, 0.0], [0.5, 0.5, 1.0], counts)
     names = ("baseline", *(f"r_A={value:g}" for value in values))
@@ -47,7 +43,7 @@ def workspaces(counts, stable=True, feasible=True, values=()):
         "case": {"lever": "error"},
     }  # fmt: skip
     shape = (len(names), *grid.shape)
-    return StabilityWorkspaces(
+    return Stability(
         arguments=arguments,
         grid=grid,
         names=names,
@@ -55,6 +51,7 @@ def workspaces(counts, stable=True, feasible=True, values=()):
         margin=np.zeros(shape),
         feasible=np.broadcast_to(feasible, grid.shape),
         versions={},
+        robot=robot,
     )
 
 
@@ -67,7 +64,7 @@ def meshes(figure):
 def test_planes_show_frame_exit_points_and_the_box_of_the_grid():
     """A grid whose points are all alike was a plain square, with one number at its ticks."""
     robot = load_robot("acrobot_large")
-    figure = stability_planes(workspaces((5, 5, 3)), robot=robot)
+    figure = stability_planes(workspaces((5, 5, 3), robot=robot))
     assert not figure_faults(figure)
     for axes in figure.axes:
         box, frame, exits = axes.lines
@@ -130,6 +127,15 @@ def test_planes_are_evenly_spaced_and_a_selection_is_said():
     assert f"{len(meshes(figure))} of 25 planes" in figure.get_suptitle()
 
 
+def test_planes_of_one_colour_are_left_out_where_others_have_a_border():
+    """Ten of twelve panels were plain rectangles."""
+    stable = np.ones((1, 1, 4, 4, 6), bool)
+    stable[..., 0, 4] = False
+    figure = stability_planes(workspaces((4, 4, 6), stable))
+    assert [axes.get_title() for axes in figure.axes] == ["z = 0.8 m"]
+    assert "1 of 6 planes, the others have one colour" in figure.get_suptitle()
+
+
 def test_ticks_of_a_square_plane_are_alike():
     figure = stability_planes(workspaces((9, 7, 4)))
     assert figure_faults(figure) == []
@@ -139,7 +145,7 @@ def test_ticks_of_a_square_plane_are_alike():
 
 
 def test_exit_points_are_over_the_solids_and_in_the_legend():
-    figure = solids_figure(workspaces((4, 4, 4)), load_robot("acrobot_large"))
+    figure = solids_figure(workspaces((4, 4, 4), robot=load_robot("acrobot_large")))
     assert figure_faults(figure) == []
     for axes in figure.axes:
         assert not axes.computed_zorder  # else matplotlib sorts by depth, solids last
@@ -212,10 +218,7 @@ def test_tables_tell_verdicts_apart_and_say_that_a_grid_is_coarse(quick):
 
 def small_workspace(robot, counts=(3, 2, 2), **asked):
     grid = grid_by_count([-0.3, -0.2, 0.2], [0.3, 0.2, 0.4], counts)
-    question = make_workspace_question(
-        robot, ["static"], grid, ["capacity-margin"], asked=WorkspaceRequest(**asked)
-    )
-    return robot_workspace(question).workspace
+    return compute_workspace(robot, "static", grid, measures="capacity-margin", workers=1, **asked)
 
 
 def notes_of(pictures, folder):
@@ -235,7 +238,7 @@ def test_a_held_robot_is_drawn_with_its_tensions(tmp_path):
     assert held.problem == note == ""
     assert notes["scale"] > robot.tension_limits()[0]
     assert notes["slack"]
-    assert notes["lines"] == []
+    assert [words for words, _ in notes["lines"]] == ["workspace static"]
 
 
 def test_a_robot_that_is_not_held_has_plain_cables_and_says_so(tmp_path):
@@ -275,24 +278,6 @@ def test_planes_paint_the_grid_and_nothing_beside(measure, counts):
             if counts[k] > 1:
                 assert column.min() == pytest.approx(lower[k])
                 assert column.max() == pytest.approx(upper[k])
-
-
-@pytest.mark.parametrize("measure", [None, "capacity-margin"])
-def test_planes_show_the_frame_the_exit_points_and_the_box_of_the_grid(measure):
-    robot = load_robot("acrobot_large")
-    figure = planes_figure(small_workspace("acrobot_large"), measure, robot)
-    assert figure_faults(figure) == []
-    axes = figure.axes[0]
-    drawn = {line.get_label(): np.array(line.get_data()) for line in axes.lines}
-    np.testing.assert_array_equal(drawn["exit points of the cables"], robot.exit_points()[:2])
-    np.testing.assert_allclose(drawn["frame"].min(axis=1), robot.frame.lower[:2])
-    np.testing.assert_allclose(drawn["box of the grid"].max(axis=1), [0.3, 0.2])
-    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
-    for points in drawn.values():
-        assert np.all(low < points.T)
-        assert np.all(high > points.T)
-    told = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert {*drawn} <= {*told}
 
 
 def test_planes_of_a_measure_say_where_there_is_no_number():

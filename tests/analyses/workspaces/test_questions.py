@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
 
-from cdpr_drake.analyses.front.stability import stability_question
 from cdpr_drake.analyses.studies.stability_recipe import recipe_case
+from cdpr_drake.analyses.workspaces.servo_stability import robot_stability, scenario_view
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
-from cdpr_drake.analyses.workspaces.stability_question import scenario_task
 from cdpr_drake.errors import BoundsFileError, CdprError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.stability.perturbation_bounds import BASELINE, PLANAR_BASELINE
@@ -102,7 +101,7 @@ ROUNDING = 1e-12
 @pytest.mark.parametrize("robot", ["acrobot_large", "caroca"])
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "acrobot_hybrid"])
 def test_nothing_is_left_to_do_where_the_camera_has_the_desired_view(robot, name):
-    task = scenario_task(robot, name)
+    task = scenario_view(robot, name)
     scenario = load_scenario(name)
     X_WC = scenario.target.pose.transform() @ scenario.desired.transform().inverse()
     assert task.target is not None
@@ -124,18 +123,17 @@ def test_nothing_is_left_to_do_where_the_camera_has_the_desired_view(robot, name
 )
 def test_what_the_criterion_is_not_about_is_refused(robot, name, words):
     with pytest.raises(CdprError, match=words):
-        scenario_task(robot, name)
+        scenario_view(robot, name)
 
 
 @pytest.mark.parametrize("robot", ["planar", "acrobot_small"])
 def test_a_question_is_about_the_servo_and_the_printed_matrix_is_an_option(robot):
     """The servo's matrix: p_CO turns with w as -w x p_CO = [p_CO]x w, by finite differences."""
-    asked = stability_question(robot)
+    grid = grid_of(robot)
+    asked = robot_stability(robot, grid)
     assert asked.case.lever == "object"
-    printed = stability_question(robot, printed_matrix=True)
-    assert printed.case.lever == "error"
-    assert asked.arguments() != printed.arguments()
-    poses = asked.grid.pose_rows(0, 1)
+    assert robot_stability(robot, grid, printed_matrix=True).case.lever == "error"
+    poses = grid.pose_rows(0, 1)
     rows = asked.case.target.rows(RotationMatrix().matrix()[None], poses[0][None, -3:])
     p, step = rows.p_CO[0], 1e-7
     slope = np.column_stack(
@@ -144,10 +142,10 @@ def test_a_question_is_about_the_servo_and_the_printed_matrix_is_an_option(robot
     x, y, z = p
     crossed = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     np.testing.assert_allclose(slope, crossed, atol=1e-6)
-    with pytest.raises(CdprError, match=r"printed matrix: found with ibvs; accepted with: pbvs"):
-        stability_question("acrobot_small", "ibvs", printed_matrix=True)
+    with pytest.raises(CdprError, match=r"printed_matrix: found with ibvs; accepted with: pbvs"):
+        robot_stability("acrobot_small", grid, scheme="ibvs", printed_matrix=True)
 
 
 def test_the_published_recipe_keeps_the_printed_matrix():
     assert recipe_case("planar", "pbvs").lever == "error"
-    assert scenario_task("acrobot_small", "acrobot_pbvs").lever == "object"
+    assert scenario_view("acrobot_small", "acrobot_pbvs").lever == "object"

@@ -4,7 +4,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.workspaces.stability_question import make_question
+from cdpr_drake.analyses.workspaces.stability import assess_stability
 from cdpr_drake.control.force_balance import FORCE
 from cdpr_drake.errors import PlanningError, ScenarioError, StabilityError, TensionProblemError
 from cdpr_drake.models.robot_loader import load_robot
@@ -150,9 +150,9 @@ def block(*words, **more):
 
 
 CALLS = {
-    "stability of a partition": (lambda: make_question("acrobot_small", scheme="partitioned"),
+    "stability of a partition": (lambda: assess_stability("acrobot_small", scheme="partitioned"),
         StabilityError, "scheme: found partitioned; accepted: pbvs, pbvs-line"),
-    "stability of a switch": (lambda: make_question("acrobot_small", scheme="switching"),
+    "stability of a switch": (lambda: assess_stability("acrobot_small", scheme="switching"),
         StabilityError, "scheme: found switching; accepted: pbvs, pbvs-line"),
     "horizon": (horizon_of_one_step, PlanningError, "horizon: found 1 steps"),
     "points to see": (lambda: planar_run("predictive.mount=onboard"),

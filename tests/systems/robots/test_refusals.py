@@ -15,7 +15,7 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.workspaces.stability_question import stability_case
+from cdpr_drake.analyses.workspaces.servo_stability import stability_case
 from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables
 from cdpr_drake.errors import (
     CableGeometryError,

@@ -1,0 +1,366 @@
+"""A robot's workspace: what it shows, gives as numbers, draws, writes, and how it is read again."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.result import Table
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
+from cdpr_drake.analyses.workspaces.box_certificates import (
+    BoxSearch,
+    RefinedBoxes,
+    agreement_numbers,
+    box_numbers,
+    save_boxes,
+)
+from cdpr_drake.analyses.workspaces.conditions import (
+    ALL,
+    BEST,
+    EXCURSION,
+    KINDS,
+    MEASURES,
+    NUMBERED,
+    SURVIVES,
+    WORST,
+)
+from cdpr_drake.analyses.workspaces.grid_runs import (
+    GridResult,
+    grid_words,
+    load_grid,
+    region_numbers,
+    save_grid,
+)
+from cdpr_drake.analyses.workspaces.workspace_hulls import (
+    NOTHING,
+    HullBound,
+    hull_numbers,
+    save_hull,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
+from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+from cdpr_drake.workspaces.hull import WorkspaceHull
+from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdpr_drake.analyses.reporting.deferred_figures import Pictures
+
+CONTRADICTION = 1
+"""Exit code if a proof contradicts the grid or the hull."""
+
+BOUNDS = {"frame": "the frame", "box": "a box", "nothing": "nothing"}
+ENDS = {"frame": " there", "box": " there", "nothing": " at ten times the frame"}
+"""What bounds a hull, and where its rays end at the latest, in words."""
+
+COMPARED = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
+"""What boxes are compared with, in words."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Workspace(GridResult):
+    """Where kinds hold on a grid, and measures there; with hull and boxes if they are computed.
+
+    Attributes:
+        holds: By kind, shape (k, nx, ny, nz).
+        values: By measure, same shape, in its unit.
+        hull: Its hull.
+        bound: Where the rays of the hull end at the latest.
+        boxes: Boxes proven inside or outside.
+        search: What was cut into boxes.
+        region: Lower and upper corner of the box given instead of the frame, shape (3,) each [m].
+        refined: How boxes were cut further along a way.
+    """
+
+    holds: dict[str, np.ndarray]
+    values: dict[str, np.ndarray]
+    hull: WorkspaceHull | None = None
+    bound: HullBound | None = None
+    boxes: CertifiedBoxes | None = None
+    search: BoxSearch | None = None
+    region: tuple[Array, Array] | None = None
+    refined: RefinedBoxes | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """1 if a proof contradicts the grid or the hull, 130 if the call was stopped."""
+        if any(len(part.broken) for part in self.agreement.values()):
+            return CONTRADICTION
+        return super().exit_code
+
+    def inside(self, kind: str = ALL) -> np.ndarray:
+        """Which poses belong to a kind, or to all of them, shape (k, nx, ny, nz)."""
+        if kind == ALL:
+            return np.asarray(np.logical_and.reduce(list(self.holds.values())))
+        return self.holds[kind]
+
+    def places(self, kind: str = ALL) -> np.ndarray:
+        """Which positions belong to it, in every or in some orientation, shape (nx, ny, nz)."""
+        rule = np.all if self.arguments["orientations"] == "all" else np.any
+        return np.asarray(rule(self.inside(kind), 0))
+
+    def volume(
+        self, kind: str = ALL, rule: VolumeRule | str = VolumeRule.CORNERS
+    ) -> WorkspaceVolume:
+        """Volume of the positions that belong to it."""
+        return workspace_volume(self.places(kind), self.grid.axes, rule)
+
+    def is_tilted(self) -> bool:
+        """True if there is a weight that does not pull along -z of W."""
+        statics = self.arguments["statics"]
+        return statics["down"] != [0.0, 0.0, -1.0] and statics["weight"] > 0.0
+
+    def axes_words(self) -> str:
+        """Of which world all coordinates are, and where the weight pulls in it."""
+        x, y, z = self.arguments["statics"]["down"]
+        if not self.is_tilted():
+            return "those of W; the weight pulls along -z"
+        tilt = np.degrees(np.arctan2(np.hypot(x, y), -z))
+        return (
+            "those of W, which was not turned; the weight pulls along "
+            f"({x:.6g}, {y:.6g}, {z:.6g}), {tilt:.4g} deg off -z"
+        )
+
+    @cached_property
+    def agreement(self) -> dict[str, BoxAgreement]:
+        """What boxes say of every pose of the grid, and of the ends of a hull's rays.
+
+        A pose that is no part of the workspace contradicts a box proven inside around it, and one
+        of the workspace contradicts a box proven outside.
+        """
+        if self.boxes is None:
+            return {}
+        parts = {"grid": grid_agreement(self.boxes, self.grid, self.inside())}
+        if self.hull is not None and len(self.grid.angles) == 1:
+            parts["hull"] = hull_agreement(self.boxes, self.hull, self.grid.angles[0])
+        return parts
+
+    def as_dict(self) -> dict[str, Any]:
+        """Arguments, axes, versions, shares, volumes, ranges of measures, hull and boxes."""
+        result: dict[str, Any] = {
+            **self.arguments, "axes": self.axes_words(), "versions": self.versions,
+            "workspaces": {name: self._numbers(name) for name in self._regions()},
+            "measured": {name: self._range(name) for name in self.values},
+        }  # fmt: skip
+        if WORST in self.values:
+            result["broken"] = self._broken()
+        if self.hull is not None and self.bound is not None:
+            result["hull"] = hull_numbers(self.hull, self.bound)
+        if self.boxes is not None and self.search is not None:
+            result["certified"] = box_numbers(self.boxes, self.search)
+            if self.refined is not None:
+                result["refined"] = self.refined.as_dict()
+            result["agreement"] = agreement_numbers(self.agreement)
+        return result
+
+    def _regions(self) -> list[str]:
+        return [*self.holds, ALL] if len(self.holds) > 1 else list(self.holds)
+
+    def _numbers(self, kind: str) -> dict[str, Any]:
+        inside = self.inside(kind)
+        return {
+            "title": KINDS[kind].title if kind in KINDS else "all of these",
+            "pose_share": float(np.mean(inside)),
+            **region_numbers(inside, self.places(kind), self.grid.axes),
+        }
+
+    def _range(self, name: str) -> dict[str, Any]:
+        """Least, median and largest finite value within the workspace."""
+        values = self.values[name][self.inside()]
+        values = values[np.isfinite(values)]
+        of: dict[str, Any] = {"least": np.min, "median": np.median, "largest": np.max}
+        return {
+            "title": MEASURES[name].title, "unit": MEASURES[name].unit,
+            **{word: finite(float(take(values))) if len(values) else None
+               for word, take in of.items()},
+        }  # fmt: skip
+
+    def _broken(self) -> dict[str, Any]:
+        """How often each cable is worst and each reaction best, and what is so at each pose.
+
+        Names are null where all cables do not hold the pose.
+        """
+        about = self.arguments["breaks"]
+        worst, best = (
+            [None if np.isnan(n) else labels[int(n) - 1] for n in self.values[key].ravel()]
+            for key, labels in ((WORST, about["cable_names"]), (BEST, about["reactions"]))
+        )
+        survives = self.holds.get(SURVIVES)
+        columns = {
+            "pose_m_rad": self.grid.pose_rows().tolist(),
+            "survives": [None] * len(worst) if survives is None else survives.ravel().tolist(),
+            "worst_cable": worst, "best_reaction": best,
+            "excursion_m": [finite(float(far)) for far in self.values[EXCURSION].ravel()],
+        }  # fmt: skip
+        return {
+            "worst_cables": dict(Counter(filter(None, worst))),
+            "best_reactions": dict(Counter(filter(None, best))),
+            "poses": [
+                dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)
+            ],
+        }
+
+    def tables(self) -> list[Table]:
+        """Shares and volumes of the kinds, and ranges of the measures."""
+        method = self.arguments["method"]
+        by = "" if method is None else f", tensions by {method}"
+        title = f"{self.arguments['robot']}: workspaces, {self.geometry}{by}"
+        rows = []
+        for name in self._regions():
+            volume, about = self.volume(name), self._numbers(name)
+            shares = f"{100.0 * about['pose_share']:.2f}", f"{100.0 * volume.share:.2f}"
+            rows.append((name, *shares, f"{volume.value:.4g}", about["title"]))
+        heads = ("kind", "poses [%]", "cells inside [%]", f"volume [{self.volume().unit}]", "where")
+        ranges = []
+        for about in (self._range(name) for name in self.values if name not in NUMBERED):
+            three = [about[word] for word in ("least", "median", "largest")]
+            values = ["-" if value is None else f"{value:.4g}" for value in three]
+            ranges.append((f"{about['title']} [{about['unit']}]", *values))
+        measured = [Table("Measures inside", ("measure", "least", "median", "largest"), ranges)]
+        return [Table(title, heads, rows), *(measured if ranges else [])]
+
+    def lines(self) -> list[str]:
+        """The grid, worst cables, hull, boxes, contradictions, and where results are."""
+        lines = [grid_words(self.grid, self.robot, self.arguments["orientations"])]
+        if self.is_tilted():
+            lines.append(f"axes: {self.axes_words()}")
+        if WORST in self.values:
+            broken = self._broken()
+            for words in ("worst cable", "best reaction"):
+                counted = broken[f"{words.replace(' ', '_')}s"].items()
+                often = ", ".join(f"{name} at {n}" for name, n in counted)
+                lines.append(f"{words} of the poses: {often or 'none'}")
+        lines += [*self._hull_lines(), *self._box_lines()]
+        return [*lines, *self.last_lines()]
+
+    def _hull_lines(self) -> list[str]:
+        if self.hull is None or self.bound is None:
+            return []
+        cut = int(np.count_nonzero(self.hull.cut))
+        return [
+            f"hull: {self.hull.volume:.4g} m^3, {self.hull.area:.4g} m^2, "
+            f"{len(self.hull.vertices)} rays, bounded by {BOUNDS[self.bound.kind]}, "
+            f"{self.bound.why}; {cut} of them were cut{ENDS[self.bound.kind]}"
+        ]
+
+    def _box_lines(self) -> list[str]:
+        if self.boxes is None or self.search is None:
+            return []
+        boxes = self.boxes
+        lines = [
+            f"certified, cables {self.search.words()['cables']}: all poses in {boxes.inside:.2%} "
+            f"of the box inside, in {boxes.outside:.2%} outside, {boxes.open:.2%} open; "
+            f"{int(boxes.curve[-1, 0])} boxes"
+        ]
+        if (finer := self.refined) is not None:
+            lines.append(
+                f"boxes within {finer.tube.reach[0]:g} m of the way: {finer.before:.2%} of them "
+                f"were open, {finer.after:.2%} are; {finer.judged} boxes"
+            )
+        for name, part in self.agreement.items():
+            lines.append(
+                f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at "
+                f"{part.poses} of them; {part.inside} in boxes proven inside, {part.outside} "
+                "outside"
+            )
+        return lines
+
+    def notes(self) -> list[str]:
+        """What may be taken for something else, and proofs that are wrong."""
+        notes = []
+        if self.robot is not None and self.robot.frame.assumed and self.region is None:
+            notes.append(
+                "note: the robot's frame was assumed when it was imported; the default grid and "
+                "certified boxes lie in it; use box for another region"
+            )
+        endless = 0 if self.hull is None else int(np.count_nonzero(self.hull.cut))
+        if endless and self.bound is not None and self.bound.kind == NOTHING:
+            notes.append(
+                f"note: {endless} rays of the hull do not end: volume and area are those of what "
+                "lies within ten times the frame; use box to end them"
+            )
+        return notes + [
+            f"error: proven boxes contradict {len(part.broken)} of {part.poses} {COMPARED[name]}, "
+            f"first at ({', '.join(f'{x:g}' for x in part.broken[0])}) [m, rad]: proof or kernel "
+            "is wrong; do not use these results, and report them"
+            for name, part in self.agreement.items() if len(part.broken)
+        ]  # fmt: skip
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """Planes of the grid by what holds and by each measure, breaks, and boxes."""
+        from cdpr_drake.analyses.workspaces import workspace_figures as draw
+
+        figures: dict[str, Callable[[], Figure]] = {
+            name or "planes": partial(draw.planes_figure, self, name)
+            for name in (None, *self.values) if name not in NUMBERED
+        }  # fmt: skip
+        if SURVIVES in self.holds:
+            figures["breaks"] = partial(draw.breaks_figure, self)
+        if self.boxes is not None:
+            name, kinds = self.arguments["robot"], list(self.arguments["kinds"])
+            figures["open_share"] = partial(draw.boxes_figure, self.boxes, name, self.geometry)
+            figures["boxes"] = partial(draw.box_planes_figure, self.boxes, name, kinds)
+        return figures
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """A row a pose: where it is, which kinds hold, and the measures in their units."""
+        parts = {**self.holds, **self.values}
+        return {**self.grid.columns(), **{name: part.reshape(-1) for name, part in parts.items()}}
+
+    def save(self, folder: Folder) -> None:
+        """Writes `workspace.npz`."""
+        arrays = {
+            **{f"kind/{name}": part for name, part in self.holds.items()},
+            **{f"measure/{name}": part for name, part in self.values.items()},
+        }
+        about = {"arguments": self.arguments, "versions": self.versions}
+        save_grid(folder, about, self.grid, arrays)
+
+    def write(
+        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
+    ) -> dict[str, str]:
+        """Writes hull, boxes, numbers, figures and the page; the grid's arrays by `save`.
+
+        Returns:
+            Why figures were not written, by file.
+        """
+        if self.hull is not None:
+            save_hull(self.hull, folder)
+        if self.boxes is not None:
+            save_boxes(self.boxes, folder)
+        return super().write(folder, formats, follow)
+
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """What writes the page for the browser, and what should be known of it."""
+        from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
+
+        return workspace_page(self, robot)
+
+
+def load_workspace(path: Path | str) -> Workspace:
+    """Reads what `Workspace.save` wrote, from its file or folder.
+
+    Raises:
+        DataFileError: There is no such file, or it is not of that kind.
+    """
+    about, grid, arrays = load_grid(path, "kind/", "workspace", "cdpr workspace")
+    groups: dict[str, dict[str, np.ndarray]] = {"kind": {}, "measure": {}}
+    for key, array in arrays.items():
+        group, _, name = key.partition("/")
+        groups[group][name] = array
+    return Workspace(
+        arguments=about["arguments"], grid=grid, versions=about["versions"],
+        holds=groups["kind"], values=groups["measure"],
+    )  # fmt: skip
