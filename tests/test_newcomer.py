@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.cli.app import OLD
 from cdpr_drake.cli.call import parsed
 from cdpr_drake.cli.commands import COMMANDS as SUBCOMMANDS
 from tests.newcomer import ROOT, Played, Player, Step, all_steps, page_steps, problem_of, table
@@ -41,7 +40,7 @@ def test_commands_of_all_pages_parse(name):
 
 
 def test_every_command_is_one_of_the_table():
-    assert {shlex.split(line)[1] for line in COMMANDS} <= {*SUBCOMMANDS, *OLD, "completion"}
+    assert {shlex.split(line)[1] for line in COMMANDS} <= {*SUBCOMMANDS, "completion"}
 
 
 def test_a_page_is_taken_apart():

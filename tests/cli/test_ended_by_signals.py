@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from cdpr_drake.analyses.front import planning
+from cdpr_drake.analyses.planning import path_plan
 from cdpr_drake.cli.app import main
 from tests.messages import messages, printed
 
@@ -81,7 +81,7 @@ def plan(here, monkeypatch, capsys):
     handlers = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
 
     def call(instead):
-        monkeypatch.setattr(planning, "plan_along_path", instead)
+        monkeypatch.setattr(path_plan, "plan_along_path", instead)
         monkeypatch.setattr(sys, "argv", ["cdpr", *PLAN.split()])
         with pytest.raises(SystemExit) as end:
             main()

@@ -12,7 +12,6 @@ import pytest
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.programs import EXAMPLES as FOLDER
 from cdpr_drake.analyses.programs import example_names
-from cdpr_drake.cli.app import OLD
 from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
 from cdpr_drake.systems.controllers.schemes import SCHEMES
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
@@ -235,4 +234,4 @@ def test_the_command_alone_shows_first_steps(capsys):
     for line, words in FIRST_STEPS.items():
         assert line in out
         assert words in out
-        assert line.split()[1] in (*COMMANDS, *OLD)
+        assert line.split()[1] in COMMANDS

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from cdpr_drake.cli.command_help import COMMANDS as OLD
 
 import cdpr_drake as cdpr
 from cdpr_drake.cli.app import main
@@ -21,10 +20,8 @@ from tests.messages import printed
 from tests.newcomer import OWN_ROBOT
 
 EXAMPLES = sorted({line for command in COMMANDS.values() for line in command.examples})
-EXAMPLES += sorted({line for _, *lines in OLD.values() for line in lines})
 EXAMPLES += sorted({*FIRST_STEPS} - set(EXAMPLES))
 
-SESSION = "cdpr_drake.cli.command_session.CommandSession.computing"
 LONG_WORK = {
     "simulate": ["cdpr_drake.cli.sessions.FollowedSession.computing"],
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],

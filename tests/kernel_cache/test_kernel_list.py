@@ -8,7 +8,7 @@ import pytest
 from cdpr_drake.analyses.installation import compilation_steps
 from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.cli import process as first_use
-from cdpr_drake.cli.app import SUBCOMMANDS
+from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.kernel_cache.kernel_list import group_names, missing_kernels, needed_kernels
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 from tests.record_kernels import signature_words
@@ -20,7 +20,7 @@ def test_its_groups_are_what_commands_ask_for():
     assert group_names() == first_use.GROUPS
     assert first_use.DEFAULT == DEFAULT_SCENARIO
     assert first_use.COMPILED in dict(compilation_steps())
-    assert set(first_use.QUESTIONS) <= set(SUBCOMMANDS)
+    assert set(first_use.QUESTIONS) <= set(COMMANDS)
 
 
 def test_its_kernels_exist_and_follow_those_that_they_call():

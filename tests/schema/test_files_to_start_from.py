@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import copy
 import json
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 
 import jsonschema
 import pytest
 import yaml
-from typer.testing import CliRunner
 
 from cdpr_drake import models
-from cdpr_drake.cli.app import make_app
+from cdpr_drake.cli.app import main
 from cdpr_drake.systems import scenarios
 
 
 def cdpr(*arguments):
     """The command's output and exit code, in this process."""
-    result = CliRunner().invoke(make_app(arguments[:1]), list(map(str, arguments)))
-    return result.output, result.exit_code
+    printed = StringIO()
+    with redirect_stdout(printed), redirect_stderr(printed), pytest.raises(SystemExit) as end:
+        main(list(map(str, arguments)))
+    return printed.getvalue(), end.value.code
 
 
 @pytest.fixture(scope="module")

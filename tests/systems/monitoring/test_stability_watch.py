@@ -17,7 +17,7 @@ from cdpr_drake.analyses.simulation.run_stability import (
     turned_criterion,
 )
 from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.stability_files import stability_figure, stability_of_folder
+from cdpr_drake.analyses.simulation.stability_files import assess_run, stability_figure
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
@@ -52,7 +52,7 @@ def servo():
 
 
 def test_live_signals_are_what_log_and_folder_tell_afterwards(result, folder):
-    log, of_folder = result.log, stability_of_folder(folder, 1.0)
+    log, of_folder = result.log, assess_run(along=folder, threshold=1.0)
     assert of_folder.as_dict()["freedom"] == 6
     for along in (stability_along(result, 1.0), of_folder.along):
         np.testing.assert_array_equal(log["taut_cables"][:, 0], along.taut)
@@ -173,10 +173,10 @@ def test_a_log_that_lacks_something_is_refused(tmp_path):
     np.savez(tmp_path / "log.npz", time=np.arange(3.0))
     (tmp_path / "scenario.yaml").write_text("name: x\n")
     with pytest.raises(OutputFolderError, match="without X_WP, X_WP_estimated, tensions, slack"):
-        stability_of_folder(tmp_path)
+        assess_run(along=tmp_path)
     (tmp_path / "log.npz").write_bytes(b"PK broken")
     with pytest.raises(OutputFolderError, match=r"log\.npz cannot be read"):
-        stability_of_folder(tmp_path)
+        assess_run(along=tmp_path)
 
 
 def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
