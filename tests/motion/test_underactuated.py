@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 import yaml
-from cdpr_drake.analyses.front.workspaces import compute_workspace
 
 from cdpr_drake.analyses.statics.static_query import static_at_lengths, static_at_pose
+from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_statics import wrench_balance
