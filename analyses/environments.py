@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import RobotWord, words
 from cdpr_drake.errors import CdprError, OutputFolderError, why_not_read
 from cdpr_drake.schema.typed_yaml import closest
@@ -55,6 +56,7 @@ class Environments(Result):
         return [] if self.picture is None else [f"picture: {self.picture}"]
 
 
+@verb()
 def list_environments(
     name: Annotated[str | None, Parameter(metavar="NAME")] = None, *,
     robot: RobotWord = "acrobot_small", action: str = "twist",

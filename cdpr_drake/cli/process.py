@@ -203,7 +203,7 @@ def _will_be_refused(command: str, words: Sequence[str]) -> bool:
     after = words[words.index(command) + 1 :]
     if command in QUESTIONS and after and not after[0].startswith("-"):
         name = after[0].partition("@")[0]
-        if not (ROBOTS / name).is_dir() and not os.path.exists(name):
+        if not os.path.isdir(ROBOTS / name) and not os.path.exists(name):  # no name is too long
             return True
     given = [word.removeprefix("--out=") for word in words if word.startswith("--out=")]
     given += [word for before, word in pairwise(words) if before == "--out"]
