@@ -93,8 +93,9 @@ def goal_of(word: str) -> GoalSettings:
 
 
 Goals = Annotated[
-    Sequence[str], words(str, "NAME or NAME=WEIGHT", "NAME[=WEIGHT]", name="--goal", many=True,
-                         completer=lambda _: list(GOALS)),
+    Sequence[str] | None,
+    words(str, "NAME or NAME=WEIGHT", "NAME[=WEIGHT]", name="--goal", many=True,
+          completer=lambda _: list(GOALS)),
 ]  # fmt: skip
 
 
@@ -224,7 +225,7 @@ class Design(Result):
 
 @verb()
 def optimize_design(
-    robot: RobotWord, *, goals: Goals = (), parameters: InputFile = None,
+    robot: RobotWord, *, goals: Goals = None, parameters: InputFile = None,
     force: float | None = None, moment: float | None = None,
     search: Annotated[str | None, one_of(SEARCHES)] = None, generations: int | None = None,
     seed: int | None = None, boxes: int = BOXES, quick: Switch = False, workers: Workers = 1,
@@ -264,7 +265,8 @@ def optimize_design(
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
     if quick:
-        boxes, generations = QUICK_BOXES, generations or QUICK_GENERATIONS
+        boxes = QUICK_BOXES
+        generations = QUICK_GENERATIONS if generations is None else generations
     with robot_reference(robot, "optimize_design") as name, ExitStack() as stack:
         loaded = load_robot(name, "optimize_design")
         source = str(parameters) if isinstance(parameters, str | Path) else "design"
@@ -311,7 +313,7 @@ def optimize_design(
 
 
 def _settings(
-    robot: Robot, goals: str | Sequence[str], parameters: Any, changes: dict[str, Any]
+    robot: Robot, goals: str | Sequence[str] | None, parameters: Any, changes: dict[str, Any]
 ) -> DesignSettings:
     """What is searched: parameters, or exit points that move by `REACH`, with changes.
 

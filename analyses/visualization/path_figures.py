@@ -218,4 +218,5 @@ def _draw_triad(axes: Any, X_WF: RigidTransform, size: float, name: str) -> None
         tip = origin + size * column
         axes.plot(*np.column_stack([origin, tip]), "k-", linewidth=1.4)
         axes.text(*(origin + 1.2 * size * column), letter, fontsize=8, ha="center", va="center")
-    axes.text(*(origin - 0.3 * size * X_WF.rotation().matrix()[:, 0]), name, fontsize=11)
+    side = "top" if name == "W" else "bottom"  # so that frames at one place keep both names
+    axes.text(*origin, f"{name} ", fontsize=11, ha="right", va=side)

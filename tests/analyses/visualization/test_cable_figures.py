@@ -47,7 +47,7 @@ def test_the_platform_is_drawn_at_the_start_and_at_the_end():
     (legend,) = figure.legends
     words = [text.get_text() for text in legend.get_texts()]
     assert {"platform's body at the start", "platform's body at the end"} <= set(words)
-    names = {text.get_text() for text in figure.axes[0].texts}
+    names = {text.get_text().strip() for text in figure.axes[0].texts}
     assert {"W", "P"} <= names
 
 
@@ -133,3 +133,14 @@ def test_a_cable_keeps_its_look_in_all_figures():
             assert line.get_color() == nth_look(k).color
             assert line.get_marker() == nth_look(k).marker
     assert nth_look(0).dash == SOLID
+
+
+def test_names_of_frames_at_one_place_are_beside_each_other():
+    robot = load_robot("acrobot_large")
+    log = {"X_WP": np.tile([1.0, 0, 0, 0, 0, 0, 0.02], (2, 1)), "slack": np.zeros((2, 8))}
+    paths = [Path3D(log["X_WP"][:, 4:], "Po", PLATFORM)]
+    figure = path_figure("home", robot, robot.cable_set(), log, paths)
+    figure.canvas.draw()
+    names = [text for text in figure.axes[0].texts if text.get_text().strip() in ("W", "P")]
+    first, second = (text.get_window_extent() for text in names)
+    assert not first.shrunk(0.9, 0.9).overlaps(second)
