@@ -87,7 +87,7 @@ def test_a_study_of_the_table_is_a_command(run, here):
     assert code == 0
     assert "toy table" in out
     assert "results: r" in out
-    assert "toy." in run("study", "--help")[1]  # the last name of the list
+    assert "toy]" in run("study", "--help")[1]  # the last name of the list
 
 
 def test_a_figure_that_fails_is_named_and_costs_no_other(run, toy, here):
