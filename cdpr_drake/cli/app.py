@@ -42,16 +42,21 @@ WIDEST = 100
 def _overview() -> str:
     """All subcommands by what they are for."""
     width = min(shutil.get_terminal_size().columns, WIDEST)
-    longest = max(map(len, COMMANDS))
+    longest = max(
+        len(f"{name} --{form}") if form else len(name)
+        for name, command in COMMANDS.items() for form in ("", *command.forms)
+    )  # fmt: skip
     lines = ["Usage: cdpr COMMAND [OPTIONS]", "", "Cable-driven parallel robots in Drake."]
     for group in dict.fromkeys(command.group for command in COMMANDS.values()):
         lines += ["", f"{group}:"]
         for name, command in COMMANDS.items():
+            forms = {f"{name} --{form}": line for form, (_, line) in command.forms.items()}
             if command.group == group:
-                lines += textwrap.wrap(
-                    command.line, width, initial_indent=f"  {name:<{longest}}  ",
-                    subsequent_indent=" " * (longest + 4),
-                )  # fmt: skip
+                for words, line in {name: command.line, **forms}.items():
+                    lines += textwrap.wrap(
+                        line, width, initial_indent=f"  {words:<{longest}}  ",
+                        subsequent_indent=" " * (longest + 4),
+                    )  # fmt: skip
     return "\n".join([
         *lines, "",
         "Of all commands: --json prints the result as JSON, --plot [FIGURE=]FILE draws it.",

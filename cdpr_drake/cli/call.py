@@ -22,6 +22,7 @@ from cyclopts import (
     Group,
     MissingArgumentError,
     Parameter,
+    UnknownOptionError,
     UnusedCliTokensError,
     convert,
 )
@@ -68,19 +69,28 @@ def make_app(command_line: Sequence[str]) -> App:
     for name, command in COMMANDS.items():
         words = {} if name == command_name else {"help": command.line}
         examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
-        for option in command.instead:
-            examples += f"\n\nAnother question: `cdpr {name} --{option}`, with `--help` for more"
+        for option, (_, line) in command.forms.items():
+            examples += f"\n\n`cdpr {name} --{option} --help`: {line}"
         app.command(_verb_of(command, command_line), name=name, help_epilogue=examples, **words)
     app.register_install_completion_command(name=COMPLETION)
     return app
 
 
 def _verb_of(command: Command, command_line: Sequence[str]) -> str:
-    """Module and function that answer a command line."""
-    options = {
-        word.partition("=")[0].removeprefix("--") for word in command_line if word[:2] == "--"
-    }
-    return next((verb for name, verb in command.instead.items() if name in options), command.verb)
+    """Module and function that answer a command line.
+
+    Raises:
+        CdprError: It has options of two forms of the command.
+    """
+    options = [f"--{form}" for form in _forms_in(command, command_line)]
+    if len(options) > 1:
+        raise CdprError(f"{options[0]}: found with {options[1]}; accepted: one of them")
+    return command.forms[options[0][2:]][0] if options else command.verb
+
+
+def _forms_in(command: Command, command_line: Sequence[str]) -> list[str]:
+    words = {word.partition("=")[0].removeprefix("--") for word in command_line if word[:2] == "--"}
+    return [form for form in command.forms if form in words]
 
 
 def _usual_parameter() -> Parameter:
@@ -158,9 +168,10 @@ def parsed(command_line: Sequence[str]) -> Call | None:
         words = f"found {name!r}; {accepted_names(name, COMMANDS)}" if name else "found none"
         raise CdprError(f"command: {words}; see cdpr --help")
     app = make_app(command_line)
-    options = dict(LOADERS)
+    options, switches = dict(LOADERS), set[str]()
     if name != COMPLETION:
         options |= options_of(resolve_name(_verb_of(COMMANDS[name], command_line)))
+        switches = {f"--{form}" for form in COMMANDS[name].forms} - set(options.values())
 
     @app.meta.default
     def meta(
@@ -187,8 +198,8 @@ def parsed(command_line: Sequence[str]) -> Call | None:
     try:
         with named_options(options):
             call = app.meta(
-                _joined(command_line), result_action="return_value", exit_on_error=False,
-                print_error=False,
+                _joined([word for word in command_line if word not in switches]),
+                result_action="return_value", exit_on_error=False, print_error=False,
             )  # fmt: skip
     except CycloptsError as problem:
         raise CdprError(_usage_words(problem, command_line)) from problem
@@ -293,11 +304,36 @@ def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
         accepted = accepted_names(token.value, choices) if choices else f"accepted: {kind}"
         if choices or kind:
             words = f"{option}: found {token.value!r}; {accepted}"
+    elif isinstance(problem, UnknownOptionError) and (owner := _owner(name, problem, command_line)):
+        words = f"{problem.token.keyword or problem.token.value}: found {owner[0]}; accepted: "
+        words += owner[1]
     elif isinstance(problem, UnusedCliTokensError):
         words = f"found {' '.join(problem.unused_tokens or ())!r}; accepted: fewer words"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
         option, info = problem.argument.name, problem.argument.field_info
-        if info.required and info.kind is not info.KEYWORD_ONLY:
+        if info.required and option == f"--{info.name}":  # it has no other name than its place
             option = option.lstrip("-").upper()
         words = f"{option}: found nothing; accepted: a value"
     return f"{words}; see cdpr {name} --help".replace("  ", " ")
+
+
+def _owner(
+    name: str, problem: UnknownOptionError, command_line: Sequence[str]
+) -> tuple[str, str] | None:
+    """How a command was called, and how it takes an option that this form of it has not."""
+    if name not in COMMANDS:
+        return None
+    command, option = (
+        COMMANDS[name],
+        (problem.token.keyword or problem.token.value).partition("=")[0],
+    )
+    without = " and ".join(f"without --{form}" for form in command.forms)
+    verbs = {
+        without: command.verb,
+        **{f"with --{f}": verb for f, (verb, _) in command.forms.items()},
+    }
+    owners = [
+        how for how, verb in verbs.items() if option in options_of(resolve_name(verb)).values()
+    ]
+    called = [f"with --{form}" for form in _forms_in(command, command_line)]
+    return (called[0] if called else without, " or ".join(owners)) if owners else None

@@ -15,14 +15,14 @@ class Command(NamedTuple):
         verb: Module and function that answers it.
         line: First line of the function's docstring, so that the help imports no verb.
         examples: Lines to try or to change.
-        instead: Other verbs by the options with which they are called instead.
+        forms: By option the verb that the command calls with it, and first line of its docstring.
     """
 
     group: str
     verb: str
     line: str
     examples: tuple[str, ...]
-    instead: Mapping[str, str] = MappingProxyType({})
+    forms: Mapping[str, tuple[str, str]] = MappingProxyType({})
 
 
 FIRST_STEPS = {
@@ -129,14 +129,27 @@ COMMANDS = {
         _ANALYSE, f"{_VERBS}.workspaces.stability:assess_stability",
         "Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).",
         ("cdpr stability acrobot_large", "cdpr stability acrobot_large --scheme pbvs --json"),
-        {"along": f"{_VERBS}.simulation.stability_files:assess_run"},
+        {"along": (
+            f"{_VERBS}.simulation.stability_files:assess_run",
+            "Judges the stability of a visual servo along a run, with slack cables left out.",
+        )},
     ),
     "plan": Command(
-        _PLAN, f"{_VERBS}.planning.command:plan",
-        "Plans a motion within limits of tensions and winches: on a path, a free one, or a proven "
-        "one.",
-        ("cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
+        _PLAN, f"{_VERBS}.planning.path_plan:plan_path",
+        "Plans the fastest motion along a path within limits of tensions and winches.",
+        ("cdpr plan acrobot_large --waypoints '0,0,0.2;0.1,-0.1,0.3'",
+         "cdpr plan acrobot_large --proven --from 0,0,0.3 --to 0.2,0,0.4",
          "cdpr plan acrobot_large --free --from 0,0,0.3 --to 0.2,0,0.4"),
+        {
+            "free": (
+                f"{_VERBS}.planning.free_plan:plan_free_motion",
+                "Plans a motion from one pose to another whose path is free, within limits.",
+            ),
+            "proven": (
+                f"{_VERBS}.planning.proven_plan:plan_proven_motion",
+                "Plans a motion from one pose to another in sets of poses that are proven.",
+            ),
+        },
     ),
     "reconfigure": Command(
         _PLAN, f"{_VERBS}.design.reconfiguration:reconfigure",

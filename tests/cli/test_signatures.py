@@ -43,13 +43,17 @@ NUMBERS = [
 ]  # fmt: skip
 
 
+NEEDED = {"--squares": "2x2", "--poses": "0,0,1"}
+"""Words of options that take no number."""
+
+
 def needed(name, *but):
     """A word for each argument that has to be there."""
     words = []
     for argument in ARGUMENTS[name]:
         if argument.required and argument.name not in but:
             choices = argument.get_choices()
-            value = choices[0] if choices else "2x2" if "squares" in argument.name else "1"
+            value = choices[0] if choices else NEEDED.get(argument.name, "1")
             words += [f"{argument.name}={value}"] if is_option(argument) else [value]
     return words
 
