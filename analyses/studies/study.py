@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.verb import verb
@@ -51,7 +51,8 @@ RESULTS = "results.json"
 MOST_SEEDS = 10_000
 """Every row of a study is listed before the first is measured."""
 
-ELSEWHERE = "name another folder, and this one by runs_from, which takes over equal calls,"
+OTHER_CODE = "name another folder, and this one by runs_from, which takes over equal calls,"
+"""What one does with a folder of the same study and form by other code."""
 
 UNITS = {
     "m": "m", "m2": "m^2", "m3": "m^3", "rad": "rad", "deg": "deg", "px": "px", "s": "s", "n": "N",
@@ -188,8 +189,11 @@ def run_study(
             where = Path(stack.enter_context(TemporaryDirectory(prefix="cdpr-study-")), one.name)
         else:
             where = Path(folder)
+        present = (read_marker(where) or {}).get("arguments")
+        earlier = isinstance(present, dict) and {**present, "code": ""} == {**arguments, "code": ""}
+        elsewhere = OTHER_CODE if earlier else "name another folder"
         results = stack.enter_context(
-            Folder(where, arguments, overwrite, grows=True, elsewhere=ELSEWHERE)
+            Folder(where, arguments, overwrite, grows=True, elsewhere=elsewhere)
         )
         rows = stack.enter_context(RowStore(results))
         if runs_from is not None:

@@ -212,7 +212,10 @@ REFUSED = {
     "recipe": (lambda path: run(path, recipe="other"), "recipe: 'other' is unknown for squares"),
     "seeds": (lambda path: run(path, seeds=0), "seeds: found 0; accepted: 1 to 10000"),
     "runs from": (lambda path: run(path / "r", runs_from=path), "accepted: a folder of this study"),
-    "other form": (lambda path: (run(path / "r"), run(path / "r", quick=False)), "quick is true"),
+    "other form": (
+        lambda path: (run(path / "r"), run(path / "r", quick=False)),
+        "quick is true there, false here; name another folder or allow overwrite",
+    ),
 }
 
 
