@@ -246,7 +246,6 @@ REFUSED = {
         ("--orientation 0,0", "--orientation"),
         ("--orientation 0,0,0:360:0.001", "--orientation", "10000"),
         ("--mass 0", "--mass"),
-        ("--workers 2", "--workers", "multiple times"),
     ],
     "workspace planar": [
         ("--box 5:6,0:1,0:1 --grid 3,3,1", "grid", "frame of planar"),
