@@ -12,6 +12,7 @@ from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.workspaces.workspace import compute_workspace
+from cdpr_drake.cli.call import parsed
 from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.simulate import PYTHON_NAMES
 from cdpr_drake.errors import CdprError
@@ -117,3 +118,9 @@ def test_functions_become_commands():
     assert with_options("or use camera.kind=projected", PYTHON_NAMES) == (
         "or use --camera projected"
     )
+
+
+def test_commands_stand_in_the_place_of_functions():
+    options = parsed(["simulate", "acrobot_pbvs"]).options
+    said = with_options("log.npz: found an end; finish_run makes results of it", options)
+    assert said == "log.npz: found an end; cdpr simulate --finish makes results of it"
