@@ -67,7 +67,7 @@ NOWHERE = "192.0.2.1"
 def test_python_reads_arguments_and_the_command_options(
     call, arguments, python, command, here, monkeypatch, capsys
 ):
-    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    monkeypatch.setattr("cdpr_drake.analyses.frame.cluster.SCHEDULER_TIMEOUT", 0.3)
     (here / "there").mkdir()
     (here / "there" / "notes.txt").touch()
     with pytest.raises(CdprError) as refused:

@@ -358,8 +358,7 @@ def held(root):
 @pytest.mark.parametrize(("line", "words"), ROWS, ids=[line[:70] for line, _ in ROWS])
 def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    for module in ("analyses.sweeps.workers", "analyses.frame.cluster"):
-        monkeypatch.setattr(f"cdpr_drake.{module}.SCHEDULER_TIMEOUT", 0.3)
+    monkeypatch.setattr("cdpr_drake.analyses.frame.cluster.SCHEDULER_TIMEOUT", 0.3)
     before = held(folder)
     said = refuse(capsys, *shlex.split(line))
     for word in words:
