@@ -176,7 +176,8 @@ WORKSPACE = {
     ),
     "workspace-method": f"{LARGE} --method closed_form --grid 5,5,3 {GRID}",
     "workspace-load": (
-        f"{LARGE} --limits 2,40 --mass 4.5 --wrench 0,0,0,3,0,0 --grid 5,5,3 --figure-format svg {GRID}"
+        f"{LARGE} --limits 2,40 --mass 4.5 --wrench 0,0,0,3,0,0 --grid 5,5,3 "
+        f"--figure-format svg {GRID}"
     ),
     "workspace-no-pulleys": f"workspace caroca --no-pulleys --grid 5,5,3 {GRID}",
     "workspace-refused-kind": f"{LARGE} --kind nice {GRID}",
