@@ -421,7 +421,7 @@ def test_a_renderer_or_a_format_that_is_not_installed_is_said_first(here, monkey
     assert "--camera projected" in said
     monkeypatch.setattr("cdpr_drake.analyses.reporting.exported_logs.find_spec", lambda name: None)
     said = refuse(capsys, "simulate", *QUICK.split(), "--log-format", "mat,parquet")
-    assert "pip install 'cdpr_drake[parquet]'" in said
+    assert "pip install '.[parquet]'" in said
     assert not any(here.iterdir())
 
 
