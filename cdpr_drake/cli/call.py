@@ -301,7 +301,9 @@ def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
         words = f"{problem.token.keyword or problem.token.value}: found {owner[0]}; accepted: "
         words += owner[1]
     elif isinstance(problem, UnusedCliTokensError):
-        words = f"found {' '.join(problem.unused_tokens or ())!r}; accepted: fewer words"
+        forms = _forms_in(COMMANDS[name], command_line) if name else []
+        form = "".join(f" with --{form}" for form in forms)
+        words = f"found {' '.join(problem.unused_tokens or ())!r}{form}; accepted: fewer words"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
         option, info = problem.argument.name, problem.argument.field_info
         if info.required and option == f"--{info.name}":  # it has no other name than its place
