@@ -6,12 +6,11 @@ import weakref
 
 import pytest
 
+from cdpr_drake.analyses.frame.figures import figure_writers, new_figure
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
-from cdpr_drake.analyses.visualization.figure_files import figure_writers
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 
 
 class Figure:

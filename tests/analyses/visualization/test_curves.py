@@ -6,14 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.visualization.curves import (
-    by_pieces,
-    draw_bars,
-    draw_curve,
-    extreme_rows,
-    path_rows,
-    spans,
-)
+from cdpr_drake.analyses.frame.figures import draw_bars, draw_curve
+from cdpr_drake.analyses.frame.thinning import by_pieces, extreme_rows, path_rows, spans
 from cdpr_drake.palette import nth_look
 
 

@@ -7,13 +7,8 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.frame.figures import figure_writers, new_figure, save_figure, write_figures
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.visualization.figure_files import (
-    figure_writers,
-    save_figure,
-    write_figures,
-)
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 
 FORMATS = ("png", "pdf", "svg")
 

@@ -20,11 +20,10 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.visualization.replay import (
     RobotPicture,
     frame_indices,
-    robot_html,
+    robot_picture,
     write_replay,
 )
-from cdpr_drake.analyses.visualization.replay_page import PageNotes, with_notes
-from cdpr_drake.analyses.visualization.replay_signals import CameraView
+from cdpr_drake.analyses.visualization.replay_page import CameraView, with_notes
 from cdpr_drake.analyses.visualization.shown_things import frustum
 from cdpr_drake.analyses.visualization.solids import transparent_paths
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
@@ -55,7 +54,7 @@ def test_frames_of_a_sparse_log_are_not_repeated():
 
 @pytest.mark.parametrize("name", REPRESENTATIVE_ROBOTS)
 def test_every_robot_has_a_page(name):
-    page = robot_html(load_robot(name))
+    page = robot_picture(load_robot(name)).html()
     assert page.lstrip().lower().startswith("<!doctype html>")
     assert 'src="http' not in page
 
@@ -135,16 +134,14 @@ def test_a_replay_says_its_time_and_names_cables_tensions_and_lines(tmp_path):
 
 
 def test_a_still_page_shows_no_time():
-    notes = notes_of(robot_html(load_robot("acrobot_small")))
+    notes = notes_of(robot_picture(load_robot("acrobot_small")).html())
     assert notes["frames"] is None
     assert notes["names"]
 
 
 def test_words_of_a_user_cannot_end_the_script():
     names = ["</script><script>alert(1)</script>", "C2"]
-    page = with_notes(
-        "<html><body></body></html>", PageNotes(names, np.zeros((3, 2)), full_scale=1.0)
-    )
+    page = with_notes("<html><body></body></html>", names, np.zeros((3, 2)), 1.0)
     assert notes_of(page)["names"] == names
     assert "<script>alert" not in page
 
@@ -173,7 +170,7 @@ def test_a_page_that_would_be_too_large_has_fewer_frames(tmp_path, monkeypatch):
     log = moving_log(robot, 150)
     write_replay(path, robot, log)
     whole = path.stat().st_size
-    empty = len(robot_html(robot))
+    empty = len(robot_picture(robot).html())
     most = int(empty + 0.5 * (whole - empty))
     monkeypatch.setattr(replay, "LARGEST_PAGE", most)
     monkeypatch.setattr(replay, "BYTES_EACH", 1)  # as if the estimate were far too low
@@ -185,10 +182,10 @@ def test_three_hours_of_frames_fit_by_estimate(tmp_path):
     robot = load_robot("acrobot_small")
     log = moving_log(robot, 100)
     picture = RobotPicture(robot, 5.0)
-    each = replay._affordable_frames(picture, log, 0)
+    each = replay.affordable_frames(picture, log, 0)
     assert each * replay.BYTES_EACH * (len(robot.cables) + 3) <= replay.LARGEST_PAGE
     slack = log | {"unstrained_lengths": np.full((100, 8), 3.0)}  # all hang
-    assert replay._affordable_frames(picture, slack, 0) < each / 3
+    assert replay.affordable_frames(picture, slack, 0) < each / 3
 
 
 def test_slack_cables_are_marked_where_the_scene_has_them_red(tmp_path):

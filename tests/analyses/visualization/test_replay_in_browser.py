@@ -5,7 +5,7 @@ import pytest
 from pydrake.geometry import Box, Rgba
 
 from cdpr_drake.analyses.visualization.replay import RobotPicture, write_replay
-from cdpr_drake.analyses.visualization.replay_signals import CameraView
+from cdpr_drake.analyses.visualization.replay_page import CameraView
 from cdpr_drake.analyses.visualization.shown_things import ShownThing, ShownView, Surroundings
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
