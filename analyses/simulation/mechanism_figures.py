@@ -19,6 +19,7 @@ from cdpr_drake.analyses.frame.figures import (
     figure_writers,
     new_figure,
     shade,
+    styled,
 )
 from cdpr_drake.analyses.frame.figures import panels as figure_panels
 from cdpr_drake.analyses.frame.thinning import by_pieces
@@ -123,11 +124,12 @@ def position_figure(run: MechanismRun) -> Figure:
         words += f": the first {len(panels)} of {len(every)}"
     size = (4.6 * columns + 1.0, 2.7 * rows + 1.4)
     figure, axes = figure_panels(len(panels), COLUMNS, size, _title(run, words), share_x=True)
-    for each, panel in zip(axes, panels, strict=True):
-        _draw_panel(each, panel, log)
-    for each in axes[-columns:]:
-        each.set_xlabel("time [s]")
-        each.tick_params(labelbottom=True)
+    with styled():
+        for each, panel in zip(axes, panels, strict=True):
+            _draw_panel(each, panel, log)
+        for each in axes[-columns:]:
+            each.set_xlabel("time [s]")
+            each.tick_params(labelbottom=True)
     return figure
 
 

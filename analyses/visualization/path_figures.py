@@ -126,11 +126,11 @@ def poses_figure(
     return figure
 
 
-def set_box(axes: Any, lower: Array, upper: Array) -> None:
+def set_box(axes: Any, lower: Array, upper: Array, zoom: float = 0.92) -> None:
     """Shows a box of the world frame W in its true proportions; corners of shape (3,) [m]."""
     for letter, low, high in zip("xyz", lower, upper, strict=True):
         axes.set(**{f"{letter}lim": (low, high), f"{letter}label": f"{letter} in W [m]"})
-    axes.set_box_aspect(upper - lower, zoom=0.92)
+    axes.set_box_aspect(upper - lower, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         # The last number of one axis and the first of the next would stand in the same corner.
         axis.set_major_locator(MaxNLocator(4, prune="both"))

@@ -60,7 +60,8 @@ def draw_solid(
         )  # fmt: skip
     edge = _draw_frame(axes, *frame)
     handles = [*axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables")]
-    set_box(axes, *frame)
+    set_box(axes, *frame, zoom=0.7)  # labels of narrow panels need room
+    axes.xaxis.labelpad, axes.zaxis.labelpad = 11.0, 9.0
     axes.view_init(*VIEW)
     return [*handles, edge]
 
