@@ -8,15 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
+from cdpr_drake.analyses.frame.figures import LEGEND_BESIDE, bars, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.palette import BOUND, MARKERS, PLATFORM, SOLID, look_of
 from cdpr_drake.tensions.methods import METHODS, feasible_polygon, solution_space
 from cdpr_drake.tensions.problem import TensionProblem, TensionSolution, TensionStatus
-
-Leaving = tuple[float, int, float]
-"""Where a line leaves along an edge, number of its cable from 1, and its bound [N]."""
 
 
 def polygon_figure(
@@ -95,38 +92,42 @@ def _draw_bounds(axes: Any, problem: TensionProblem, t: Array, N: Array) -> None
 
     The words stand at the right and at the top; lines that leave together share theirs.
     """
-    ends: dict[int, list[Leaving]] = {0: [], 1: []}
+    ends: dict[str, list[tuple[float, int, float]]] = {"right": [], "top": []}
     for bounds, style in ((problem.lower, "-"), (problem.upper, "--")):
         for i, bound in enumerate(bounds):
             line = _line_within(axes, N[i], bound - t[i])
-            if line is None:
-                continue
-            axes.plot(*line.T, style, color="0.6", linewidth=0.8)
-            right = abs(N[i, 1]) > abs(N[i, 0])  # it runs more along x than along y
-            last = line[np.argmax(line[:, 0 if right else 1])]
-            ends[0 if right else 1].append((float(last[1 if right else 0]), i + 1, float(bound)))
-    for across, leaving in ends.items():
-        low, high = axes.get_ylim() if across == 0 else axes.get_xlim()
-        for group in _near(sorted(leaving), (0.06, 0.24)[across] * (high - low)):
-            middle = (group[0][0] + group[-1][0]) / 2.0
-            named: dict[float, list[int]] = {}
+            if line is not None:
+                axes.plot(*line.T, style, color="0.6", linewidth=0.8)
+                side, along = ("right", 0) if abs(N[i, 1]) > abs(N[i, 0]) else ("top", 1)
+                end = line[np.argmax(line[:, along])]
+                ends[side].append((float(end[1 - along]), i + 1, float(bound)))
+    for side, gap, limits in (("right", 0.06, axes.get_ylim()), ("top", 0.24, axes.get_xlim())):
+        low, high = limits
+        groups: list[list[tuple[float, int, float]]] = []
+        for end in sorted(ends[side]):
+            if groups and end[0] - groups[-1][0][0] <= gap * (high - low):
+                groups[-1].append(end)
+            else:
+                groups.append([end])
+        for group in groups:
+            numbers: dict[float, list[int]] = {}
             for _, number, bound in group:
-                named.setdefault(bound, []).append(number)
+                numbers.setdefault(bound, []).append(number)
             words = "\n".join(
-                f"cable{'s' * (len(numbers) > 1)} {', '.join(map(str, sorted(numbers)))} at "
-                f"{bound:g} N"
-                for bound, numbers in named.items()
+                f"cable{'s' * (len(same) > 1)} {', '.join(map(str, sorted(same)))} at {bound:g} N"
+                for bound, same in numbers.items()
             )
-            place = (1.01, (middle - low) / (high - low))
+            middle = (0.5 * (group[0][0] + group[-1][0]) - low) / (high - low)
+            at_right = side == "right"
             axes.text(
-                *(place if across == 0 else place[::-1]), words, color="0.3", fontsize=9,
-                transform=axes.transAxes, ha="left" if across == 0 else "center",
-                va="center" if across == 0 else "bottom",
+                *((1.01, middle) if at_right else (middle, 1.01)), words, color="0.3", fontsize=9,
+                transform=axes.transAxes, ha="left" if at_right else "center",
+                va="center" if at_right else "bottom",
             )  # fmt: skip
 
 
 def _line_within(axes: Any, normal: Array, offset: float) -> Array | None:
-    """Where a line enters and leaves the axes, shape (2, 2); None where it does not."""
+    """Where the line normal @ x = offset enters and leaves the axes, shape (2, 2), or None."""
     (x_low, x_high), (y_low, y_high) = axes.get_xlim(), axes.get_ylim()
     (a, b), ends = normal, []
     for x in (x_low, x_high):
@@ -138,24 +139,8 @@ def _line_within(axes: Any, normal: Array, offset: float) -> Array | None:
     return np.array(ends[:2]) if len(ends) >= 2 else None
 
 
-def _near(
-    places: list[tuple[float, int, float]], gap: float
-) -> list[list[tuple[float, int, float]]]:
-    """Places in a row, together where the first is no farther away than a gap."""
-    groups: list[list[tuple[float, int, float]]] = []
-    for place in places:
-        if groups and place[0] - groups[-1][0][0] <= gap:
-            groups[-1].append(place)
-        else:
-            groups.append([place])
-    return groups
-
-
 def tension_figure(
-    names: Sequence[str],
-    tensions: Mapping[str, Array],
-    bounds: tuple[Array, Array],
-    title: str,
+    names: Sequence[str], tensions: Mapping[str, Array], bounds: tuple[Array, Array], title: str
 ) -> Figure:
     """Tensions of each cable as bars, by one method or several, with their bounds.
 
@@ -166,25 +151,19 @@ def tension_figure(
         title: Title.
     """
     figure, axes = new_figure(1, 1, (10.0, 5.0), title)
-    places, width = np.arange(len(names)), 0.8 / max(len(tensions), 1)
-    for k, (method, values) in enumerate(tensions.items()):
-        look = look_of(method, list(METHODS)) if len(tensions) > 1 else PLATFORM
-        shift = (k - (len(tensions) - 1) / 2.0) * width
-        axes.bar(places + shift, values, width, label=method, **bar_style(look))
+    looks = [look_of(method, list(METHODS)) for method in tensions if len(tensions) > 1]
+    bars(axes, names, tensions, looks or [PLATFORM])
     largest = max(float(np.max(t, where=np.isfinite(t), initial=0.0)) for t in tensions.values())
     if largest == 0.0:
         words = "no tensions hold the platform"
         axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center")
         largest = float("inf")
+    edges = np.arange(len(names) + 1) - 0.5
     for words, values in zip(("lower", "upper"), bounds, strict=True):
         if np.min(values) <= 2.0 * largest:
-            same = f" {values[0]:g} N" if np.ptp(values) == 0.0 else ""
-            edges = np.arange(len(names) + 1) - 0.5
-            axes.stairs(
-                values, edges, baseline=None, label=f"{words} bound{same}", **line_style(BOUND)
-            )
+            label = f"{words} bound" + (f" {values[0]:g} N" if np.ptp(values) == 0.0 else "")
+            axes.stairs(values, edges, baseline=None, label=label, **line_style(BOUND))
     axes.set_ylim(bottom=0.0)
-    axes.set_xticks(places, names)
     axes.set(ylabel="tension [N]")
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes.legend(**LEGEND_BESIDE)
     return figure

@@ -15,10 +15,7 @@ from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import ModelWord, refuse_arguments, words
 from cdpr_drake.analyses.reporting.written_files import whole_file
-from cdpr_drake.analyses.visualization.mechanism_picture import (
-    MechanismPicture,
-    mechanism_picture,
-)
+from cdpr_drake.analyses.visualization.mechanism_replay import MechanismScene, mechanism_picture
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.visualization.replay import RobotPicture, robot_picture
 from cdpr_drake.errors import OutputFolderError, plain_words, why_not_read
@@ -39,7 +36,7 @@ class View(Result):
     """
 
     name: str
-    picture: RobotPicture | MechanismPicture
+    picture: RobotPicture | MechanismScene
     place: str | Path
 
     def as_dict(self) -> dict[str, Any]:

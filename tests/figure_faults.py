@@ -16,7 +16,7 @@ from matplotlib.transforms import Bbox
 from mpl_toolkits.mplot3d import proj3d
 from mpl_toolkits.mplot3d.art3d import Text3D
 
-from cdpr_drake.analyses.visualization.figure_style import lay_out, styled
+from cdpr_drake.analyses.frame.figures import lay_out, styled
 
 EDGE = 2.0
 """So far may a box of words reach over the edge [px]: boxes hold room for letters that go deep."""

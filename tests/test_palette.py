@@ -68,3 +68,11 @@ def test_no_figure_chooses_colours_of_its_own(path):
         r"""["']C\d["']|color=f["']C\{|color=["'](?:tab:|[rgbcmy]["'])""", path.read_text()
     )
     assert not found
+
+
+def test_dark_pages_show_every_colour():
+    for color in (*palette.COLORS, *palette.TENSIONS):
+        shown = palette.on_dark(color)
+        assert palette.contrast(shown, palette.DARK_GROUND) >= palette.LEAST_CONTRAST
+    assert palette.on_dark("#ffffff") == "#ffffff"
+    assert palette.contrast("#000000", "#ffffff") == pytest.approx(21.0)

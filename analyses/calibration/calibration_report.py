@@ -15,10 +15,11 @@ from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.fit_verdict import MISFIT_FACTOR
 from cdpr_drake.analyses.calibration.log_fit import LogFit
 from cdpr_drake.analyses.calibration.row_figure import row_figure
+from cdpr_drake.analyses.frame.figures import bars, new_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
+from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.calibration.result import Outlier
@@ -255,36 +256,36 @@ def _fit_figure(calibration: Calibration) -> Figure:
     title = title if calibration.misfit else name
     figure, axes = new_figure(1, 2, (13.0, 5.0), title)
     kinds = [kind for kind, fit in result.residuals.items() if fit.count + fit.dropped]
-    places = np.arange(len(kinds))
-    for offset, what, k in ((-0.2, "rms", 0), (0.2, "largest", 1)):
-        heights = [getattr(result.residuals[kind], what) for kind in kinds]
-        axes[0].bar(places + offset, heights, 0.4, label=what, **bar_style(nth_look(k)))
-    axes[0].axhline(1.0, color="#202020", linestyle="--", linewidth=1.0)
+    fits = [result.residuals[kind] for kind in kinds]
     labels = [
         f"{kind}\n{fit.dropped} of {fit.count + fit.dropped} dropped" if fit.dropped else kind
-        for kind, fit in result.residuals.items()
-        if kind in kinds
+        for kind, fit in zip(kinds, fits, strict=True)
     ]
-    axes[0].set_xticks(places, labels)
+    heights = {"rms": [fit.rms for fit in fits], "largest": [fit.largest for fit in fits]}
+    bars(axes[0], labels, heights)
+    axes[0].axhline(1.0, color="#202020", linestyle="--", linewidth=1.0)
     axes[0].set(ylabel="residual over its sigma [-]", title="how measurements fit")
     axes[0].legend()
     groups = grouped(calibration)
-    places = np.arange(len(groups))
-    for offset, label, k in ((-0.2, "change, rms", 2), (0.2, "standard deviation, median", 3)):
-        heights = [
-            np.sqrt(np.mean(values**2)) if k == 2 else np.median(std)
-            for _, _, values, std in groups
-        ]
-        shown = np.where(np.isfinite(heights) & (np.array(heights) > 0.0), heights, np.nan)
-        axes[1].bar(places + offset, shown, 0.4, label=label, **bar_style(nth_look(k)))
+    names = [f"{group.replace('_', ' ')} [{unit}]" for group, unit, _, _ in groups]
+    spreads = {
+        "change, rms": [np.sqrt(np.mean(values**2)) for _, _, values, _ in groups],
+        "standard deviation, median": [np.median(std) for _, _, _, std in groups],
+    }
+    shown = {label: _above_zero(values) for label, values in spreads.items()}
+    bars(axes[1], names, shown, (nth_look(2), nth_look(3)), rotation=25, ha="right")
     axes[1].set_yscale("log")
     low, high = axes[1].get_ylim()  # whole decades, so that a bar's height says something
     axes[1].set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
-    names = [f"{group.replace('_', ' ')} [{unit}]" for group, unit, _, _ in groups]
-    axes[1].set_xticks(places, names, rotation=25, ha="right")
     axes[1].set(title="what was found", ylabel="in the unit that is named below")
     axes[1].legend()
     return figure
+
+
+def _above_zero(values: Sequence[float]) -> Array:
+    """What a logarithmic axis shows; the rest is NaN."""
+    heights = np.array(values, float)
+    return np.where(np.isfinite(heights) & (heights > 0.0), heights, np.nan)
 
 
 def _correlation_figure(calibration: Calibration) -> Figure:

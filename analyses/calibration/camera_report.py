@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from cdpr_drake.analyses.frame.figures import bar_style, new_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.models.camera_catalogue import Camera, Distortion, fold_problem
 from cdpr_drake.palette import nth_look
 from cdpr_drake.vision.camera_fit import CELLS, CORNER_OUTLIER, LEAST_OUTLIER, OUTLIER, CameraFit

@@ -14,10 +14,10 @@ from cdpr_drake.analyses.calibration.free_motion import FollowedStretch, FreeMot
 from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
 from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.frame.figures import few_ticks, line_style, new_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_style import few_ticks, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial

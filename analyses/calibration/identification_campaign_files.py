@@ -16,14 +16,13 @@ from rich.table import Table
 from cdpr_drake.analyses.calibration.identification_campaign import DynamicCampaign
 from cdpr_drake.analyses.calibration.identification_report import identification_fit
 from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
+from cdpr_drake.analyses.frame.figures import bars, new_figure
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import column_names, write_scenario, write_whole
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.scenarios.tension_control_scenario import Stretch, TensionScenario
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -107,15 +106,15 @@ def _tracking_figure(campaign: DynamicCampaign) -> Figure:
         1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"
     )
     whos = list(campaign.tracking)
-    places = np.arange(len(whos))
     for ax, (key, scale, words) in zip(
         axes, (("m", 1e3, "distance [mm]"), ("rad", 180.0 / np.pi, "angle [deg]")), strict=True
     ):
-        for shift, which, k in ((-0.2, "mean", 0), (0.2, "largest", 1)):
-            heights = [scale * campaign.tracking[who][f"{which}_{key}"] for who in whos]
-            ax.bar(places + shift, heights, 0.4, label=which, **bar_style(nth_look(k)))
+        heights = {
+            which: [scale * campaign.tracking[who][f"{which}_{key}"] for who in whos]
+            for which in ("mean", "largest")
+        }
+        bars(ax, whos, heights)
         ax.set_yscale("log")
-        ax.set_xticks(places, whos)
         ax.set(ylabel=words, xlabel="robot believed in")
     axes[0].legend()
     return figure

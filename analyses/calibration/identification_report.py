@@ -13,10 +13,10 @@ from rich.table import Table
 from cdpr_drake.analyses.calibration.identification_task import Identification
 from cdpr_drake.analyses.calibration.identified_robots import identified_robot
 from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.palette import BOUND, nth_look

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
-from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.analyses.frame.figures import new_figure
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.palette import nth_look
 

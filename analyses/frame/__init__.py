@@ -1,1 +1,5 @@
-"""What all long questions share: a results folder, finished jobs, and who follows the work."""
+"""What all questions share: words, results, figures, a results folder, jobs, and who follows."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -19,12 +19,12 @@ from cdpr_drake.analyses.calibration.camera_report import (
     camera_tables,
     fitted_camera,
 )
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
 from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
 from cdpr_drake.errors import CameraCalibrationError
 from cdpr_drake.models.camera_catalogue import Camera
 from cdpr_drake.summaries import Summarized

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
@@ -17,7 +18,6 @@ from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.simulation.break_report import REACTIONS, after_break
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.typed_yaml import closest
@@ -74,7 +74,7 @@ class BreakReactions(Tabulated):
 
     def plot(self) -> Figure:
         """How far the platform went and how fast it was at most."""
-        from cdpr_drake.analyses.visualization.figure_style import new_figure
+        from cdpr_drake.analyses.frame.figures import new_figure
 
         title = f"{self.cable} breaks at {self.time:g} s, {self.geometry}"
         drawn, axes = new_figure(1, 2, (10.0, 4.0), title)

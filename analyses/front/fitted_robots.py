@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.log_fit import LogFit
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, write_figures
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest

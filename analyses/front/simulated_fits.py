@@ -23,6 +23,7 @@ from cdpr_drake.analyses.calibration.identification_campaign import (
 )
 from cdpr_drake.analyses.calibration.identification_campaign_files import write_dynamic_campaign
 from cdpr_drake.analyses.calibration.log_fit import ROBOT
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.calibration import proposed_poses
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
@@ -30,7 +31,6 @@ from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.reporting.tables import new_table
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import as_kind

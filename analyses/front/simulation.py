@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, is_undrawn, write_pictures
@@ -35,7 +36,6 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
 from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json

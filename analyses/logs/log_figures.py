@@ -8,6 +8,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.calibration import columns
+from cdpr_drake.analyses.frame.figures import (
+    draw_curve,
+    few_ticks,
+    panels,
+    phase_of,
+    shade,
+    styled,
+)
 from cdpr_drake.analyses.logs.recorded_log import (
     ANGLES,
     COMMANDED,
@@ -19,8 +27,6 @@ from cdpr_drake.analyses.logs.recorded_log import (
     RecordedLog,
     quantity,
 )
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of, shade
-from cdpr_drake.analyses.visualization.figure_style import few_ticks, new_figure, styled
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 
@@ -42,23 +48,17 @@ MOST_NAMED = 8
 
 
 def log_figure(log: RecordedLog) -> Figure:
-    """All kinds of columns of a log, one below the other; what is not drawn is said.
-
-    Args:
-        log: The log.
-    """
-    panels = _panels(log)[:MOST_PANELS]
-    drawn = {TIME, *(header for _, _, headers in panels for header in headers)}
+    """All kinds of columns of a log, one below the other; what is not drawn is said."""
+    kinds = _panels(log)[:MOST_PANELS]
+    drawn = {TIME, *(header for _, _, headers in kinds for header in headers)}
     left = [header for header in log.columns if header not in drawn]
     time = log.time
     t: Array = np.arange(1, log.count + 1, dtype=float) if time is None else time
-    figure, all_axes = new_figure(
-        max(len(panels), 1), 1, (9.0, 1.2 + 2.1 * max(len(panels), 1)),
-        "\n".join([f"{log.path.name}: {log.row_report().words()}", *_not_drawn(left)]),
-    )  # fmt: skip
-    row_axes = np.atleast_1d(all_axes)
+    title = "\n".join([f"{log.path.name}: {log.row_report().words()}", *_not_drawn(left)])
+    size = (9.0, 1.2 + 2.1 * max(len(kinds), 1))
+    figure, row_axes = panels(len(kinds), 1, size, title)
     with styled():
-        for axes, (title, unit, headers) in zip(row_axes, panels, strict=False):
+        for axes, (title, unit, headers) in zip(row_axes, kinds, strict=False):
             for k, header in enumerate(headers):
                 _draw(axes, t, log.columns[header], k, len(headers), header)
             if time is not None and len(time) > 1:

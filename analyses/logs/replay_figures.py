@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.geometry import Box
 
+from cdpr_drake.analyses.frame.figures import draw_curve, figure_writers, panels, phase_of, styled
 from cdpr_drake.analyses.logs.followed_log import FollowedLog
 from cdpr_drake.analyses.logs.log_replay import LogReplay
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import new_figure, styled
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.analyses.visualization.shown_things import ShownThing, Surroundings
 from cdpr_drake.arrays import Array
@@ -23,44 +22,38 @@ MODEL_COLOR = (0.9, 0.6, 0.0, 0.45)
 
 def residual_figure(replay: LogReplay, followed: FollowedLog | None = None) -> Figure:
     """Residuals of lengths and tensions by cable, distances of positions, over time."""
-    names = [cable.name for cable in replay.robot.cables]
-    panels: list[tuple[str, list[tuple[str, Array, Array]]]] = []
-
-    def add(title: str, rows: list[tuple[str, Array, Array]]) -> None:
-        kept = [row for row in rows if np.isfinite(row[2]).any()]
-        if kept:
-            panels.append((title, kept))
-
-    time = replay.time
-    add(
-        "length, measured\nminus model [mm]",
-        [(n, time, 1e3 * replay.length_residuals[:, k]) for k, n in enumerate(names)],
-    )
-    off = replay.tensions - replay.predicted_tensions
-    add(
-        "tension, measured\nminus model [N]",
-        [(n, time, off[:, k]) for k, n in enumerate(names)],
-    )
-    apart = [("model by lengths", time, 1e3 * replay.distances)]
-    if followed is not None:
-        apart.append(("simulated", followed.time, 1e3 * followed.distances))
-    add("distance from the\nmeasured position [mm]", apart)
     moments = replay.robot.motion_type().num_turns
-    size: Array = np.linalg.norm(replay.unbalanced[:, moments:], axis=1)
-    add("force left by\ntensions, weight [N]", [("at rest", time, size)])
-    count = max(len(panels), 1)
-    figure, all_axes = new_figure(
-        count, 1, (9.0, 1.2 + 2.2 * count), f"{replay.log.path.name} beside {replay.robot.name}"
-    )
-    row_axes = np.atleast_1d(all_axes)
+    forces: Array = np.linalg.norm(replay.unbalanced[:, moments:], axis=1)
+
+    def by_cable(residuals: Array) -> dict[str, tuple[Array, Array]]:
+        cables = zip(replay.robot.cables, residuals.T, strict=True)
+        return {cable.name: (replay.time, row) for cable, row in cables}
+
+    distances = {"model by lengths": (replay.time, 1e3 * replay.distances)}
+    if followed is not None:
+        distances["simulated"] = (followed.time, 1e3 * followed.distances)
+    residuals = {
+        "length, measured\nminus model [mm]": by_cable(1e3 * replay.length_residuals),
+        "tension, measured\nminus model [N]": by_cable(replay.tensions - replay.predicted_tensions),
+        "distance from the\nmeasured position [mm]": distances,
+        "force left by\ntensions, weight [N]": {"at rest": (replay.time, forces)},
+    }
+    finite = {
+        label: {name: row for name, row in rows.items() if np.isfinite(row[1]).any()}
+        for label, rows in residuals.items()
+    }
+    shown = {label: rows for label, rows in finite.items() if rows}
+    size = (9.0, 1.2 + 2.2 * max(len(shown), 1))
+    title = f"{replay.log.path.name} beside {replay.robot.name}"
+    figure, all_axes = panels(len(shown), 1, size, title)
     with styled():
-        for axes, (title, curves) in zip(row_axes, panels, strict=False):
-            for k, (name, t, values) in enumerate(curves):
-                phase = phase_of(k, len(curves))
-                draw_curve(axes, t, values, nth_look(k), name, phase=phase)
-            axes.set_ylabel(title)
+        for axes, (label, rows) in zip(all_axes, shown.items(), strict=False):
+            for k, (name, (times, values)) in enumerate(rows.items()):
+                phase = phase_of(k, len(rows))
+                draw_curve(axes, times, values, nth_look(k), name, phase=phase)
+            axes.set_ylabel(label)
             axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-        row_axes[-1].set_xlabel("time [s]" if replay.log.time is not None else "row")
+        all_axes[-1].set_xlabel("time [s]" if replay.log.time is not None else "row")
     return figure
 
 
@@ -68,8 +61,6 @@ def replay_pictures(
     replay: LogReplay, followed: FollowedLog | None, formats: tuple[str, ...]
 ) -> dict[str, Callable[..., object]]:
     """What writes the figures and the replay page, by the names of the files."""
-    from cdpr_drake.analyses.visualization.figure_files import figure_writers
-
     pictures: dict[str, Callable[..., object]] = {
         **figure_writers({"residuals": lambda: residual_figure(replay, followed)}, formats)
     }

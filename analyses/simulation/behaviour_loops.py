@@ -13,9 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.visualization.curves import path_rows
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, nth_look

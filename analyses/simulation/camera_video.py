@@ -11,7 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.analyses.simulation.run_summary import image_path
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.visualization.replay import frame_indices
-from cdpr_drake.analyses.visualization.replay_signals import CameraView
+from cdpr_drake.analyses.visualization.replay_page import CameraView
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_laws import port_energy
 from cdpr_drake.geometry.poses import rotation_from_angles

@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    LEGEND_BESIDE,
+    draw_curve,
+    line_style,
+    new_figure,
+    panels,
+    shade,
+)
 from cdpr_drake.analyses.reporting.log_on_disk import Log
 from cdpr_drake.analyses.visualization.cable_figures import draw_cables
-from cdpr_drake.analyses.visualization.curves import draw_curve, shade
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, DISTANCE
@@ -31,7 +37,7 @@ def motor_figure(title: str, robot: Robot, log: Log) -> Figure:
     for sign, name in ((-1.0, None), (1.0, f"static friction\n{law.friction.static:g} N m")):
         axes[1].axhline(sign * law.friction.static, label=name, **line_style(BOUND))
     for each in axes:
-        each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        each.legend(**LEGEND_BESIDE)
     return figure
 
 
@@ -52,7 +58,7 @@ def tension_loop_figure(title: str, robot: Robot, log: Log, limits: tuple[float,
     for each, label in zip(axes, labels, strict=True):
         shade(each, times, log["relaxed"][1:, 0] > 0.0, "wrench infeasible")
         each.set(xlabel="time [s]", ylabel=label)
-        each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        each.legend(**LEGEND_BESIDE)
     return figure
 
 
@@ -87,8 +93,9 @@ def reading_errors(log: Log, settings: SensorSettings, sensor: str) -> tuple[Arr
 
 def reading_figure(title: str, robot: Robot, log: Log, settings: SensorSettings) -> Figure:
     """What the logged sensors read beyond the truth at the time when they read."""
-    figure, axes = new_figure(len(settings.log), 1, (10.0, 3.0 * len(settings.log) + 0.5), title)
-    for each, sensor in zip(np.atleast_1d(axes), settings.log, strict=True):
+    count = len(settings.log)
+    figure, axes = panels(count, 1, (10.0, 3.0 * count + 0.5), title)
+    for each, sensor in zip(axes, settings.log, strict=True):
         times, error = reading_errors(log, settings, sensor)
         _, scale, label = READING_PANELS[sensor]
         if SENSORS[sensor].reading.startswith("X_"):
@@ -96,6 +103,6 @@ def reading_figure(title: str, robot: Robot, log: Log, settings: SensorSettings)
             each.set(ylim=(0.0, None))
         else:
             draw_cables(each, robot, times, error, scale)
-            each.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+            each.legend(**LEGEND_BESIDE)
         each.set(xlabel="time [s]", ylabel=label)
     return figure

@@ -12,6 +12,17 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import QuaternionFloatingJoint
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    curves,
+    draw_curve,
+    figure_writers,
+    new_figure,
+    shade,
+    styled,
+)
+from cdpr_drake.analyses.frame.figures import panels as figure_panels
+from cdpr_drake.analyses.frame.thinning import by_pieces
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.simulation.mechanism_run import (
     MechanismRun,
@@ -19,13 +30,10 @@ from cdpr_drake.analyses.simulation.mechanism_run import (
     mechanism_geometry,
 )
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.curves import by_pieces, draw_curve, phase_of, shade
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
 from cdpr_drake.analyses.visualization.mechanism_replay import write_mechanism_replay
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import angles_from_rotation
-from cdpr_drake.palette import Look, nth_look
+from cdpr_drake.palette import Look
 from cdpr_drake.systems.diagrams.mechanism_control import part_name
 from cdpr_drake.systems.scenarios.mechanism_motion import moving_joints
 from cdpr_drake.systems.scenarios.mechanism_scenario import COMPUTED_TORQUE
@@ -110,40 +118,29 @@ def position_figure(run: MechanismRun) -> Figure:
     """Positions of joints and free bodies, wanted and reached."""
     every = _panels(run)
     panels, log = every[:MOST_PANELS], run.log
-    rows = -(-len(panels) // COLUMNS)
-    columns = min(COLUMNS, len(panels))
+    rows, columns = -(-len(panels) // COLUMNS), min(COLUMNS, len(panels))
     words = "Positions of joints and free bodies"
     if len(panels) < len(every):
         words += f": the first {len(panels)} of {len(every)}"
-    figure = bare_figure((4.6 * columns + 1.0, 2.7 * rows + 1.4), _title(run, words))
+    size = (4.6 * columns + 1.0, 2.7 * rows + 1.4)
+    figure, axes = figure_panels(len(panels), COLUMNS, size, _title(run, words), share_x=True)
     with styled():
-        axes = np.atleast_1d(figure.subplots(rows, columns, sharex=True, squeeze=False)).ravel()
-        for one, panel in zip(axes, panels, strict=False):
-            _draw_panel(one, run, panel, log)
-        for one in axes[len(panels) :]:
-            one.set_visible(False)
-        for one in axes[max(len(panels) - columns, 0) : len(panels)]:
-            one.set_xlabel("time [s]")
-            one.tick_params(labelbottom=True)
+        for each, panel in zip(axes, panels, strict=True):
+            _draw_panel(each, panel, log)
+        for each in axes[-columns:]:
+            each.set_xlabel("time [s]")
+            each.tick_params(labelbottom=True)
     return figure
 
 
-def _draw_panel(axes: Any, run: MechanismRun, panel: _Panel, log: Any) -> None:
+def _draw_panel(axes: Any, panel: _Panel, log: Any) -> None:
     reached = by_pieces(panel.values, log["positions"])
     wanted = by_pieces(panel.values, log["wanted_positions"])
     count = len(panel.curves)
     for k in range(count):  # below what is reached, which nearly always covers it
         label = "wanted" if k == count - 1 else None
         draw_curve(axes, log["time"], wanted[:, k], WANTED, label, linewidth=6.0)
-    for k, name in enumerate(panel.curves):
-        draw_curve(
-            axes,
-            log["time"],
-            reached[:, k],
-            nth_look(k),
-            f"{name} reached".strip(),
-            phase=phase_of(k, count),
-        )
+    curves(axes, log["time"], reached, [f"{name} reached".strip() for name in panel.curves])
     axes.set_title(panel.name, fontsize=11)
     axes.set_ylabel(panel.label)
     axes.margins(x=0.01)
@@ -172,11 +169,8 @@ def mechanism_error_figure(run: MechanismRun) -> Figure:
     figure, axes = new_figure(1, len(wanted), (6.0 * len(wanted) + 3.0, 5.0), title)
     for one, (values, which, words, scale) in zip(np.atleast_1d(axes), wanted, strict=True):
         shown = [k for k, name in enumerate(names) if parts[name][which]]
-        for place, k in enumerate(shown):
-            phase = phase_of(place, len(shown))
-            draw_curve(
-                one, log["time"], values[:, k], nth_look(k), names[k], scale=scale, phase=phase
-            )
+        labels = [names[k] for k in shown]
+        curves(one, log["time"], values[:, shown], labels, numbers=shown, scale=scale)
         one.set(xlabel="time [s]", ylabel=words)
         _shade_missed(one, run)
         one.margins(x=0.01)
@@ -216,11 +210,9 @@ def motor_figure(run: MechanismRun) -> Figure:
     figure, axes = new_figure(1, len(groups), (6.0 * len(groups) + 3.0, 5.0), title)
     first = first_commanded(run)
     for one, (words, shown) in zip(np.atleast_1d(axes), groups, strict=True):
-        for place, k in enumerate(shown):
-            draw_curve(
-                one, log["time"][first:], log["motor_forces"][first:, k], nth_look(k),
-                names[rows[k]], phase=phase_of(place, len(shown)),
-            )  # fmt: skip
+        labels = [names[rows[k]] for k in shown]
+        forces = log["motor_forces"][first:, shown]
+        curves(one, log["time"][first:], forces, labels, numbers=shown)
         one.set(xlabel="time [s]", ylabel=words)
         one.margins(x=0.01)
         one.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=9)

@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 
+from cdpr_drake.analyses.frame.thinning import by_pieces
 from cdpr_drake.analyses.reporting.log_files import (
     LogNames,
     finite,
@@ -31,7 +32,6 @@ from cdpr_drake.analyses.simulation.run_loop import (
 )
 from cdpr_drake.analyses.simulation.session import DEFAULT_SESSION, RunSession, check_connected
 from cdpr_drake.analyses.simulation.start_checks import check_length, limit_warnings
-from cdpr_drake.analyses.visualization.curves import by_pieces
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.models.mechanism_in_plant import add_mechanism

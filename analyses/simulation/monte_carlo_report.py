@@ -13,15 +13,20 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    draw_curve,
+    figure_writers,
+    line_style,
+    new_figure,
+)
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns
 from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord
-from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import DESIRED, IDEAL, OTHER_OUTCOME, OUTCOMES, Look

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.analyses.frame.figures import curves, draw_curve, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
@@ -64,12 +63,8 @@ def camera_joints_figure(title: str, log: Log, pinhole: Pinhole) -> Figure:
     """Angles of the joints, what the encoders read beyond them, and where the target is."""
     figure, axes = new_figure(3, 1, (10.0, 9.0), title)
     true, read = np.asarray(log[LOGGED_JOINTS]), np.asarray(log[LOGGED_ENCODERS])
-    for k, name in enumerate(("pan", "tilt")):
-        for each, values in ((axes[0], true[:, k]), (axes[1], read[:, k] - true[:, k])):
-            draw_curve(
-                each, log["time"], values, nth_look(k), name,
-                scale=180.0 / np.pi, phase=phase_of(k, 2),
-            )  # fmt: skip
+    for each, values in ((axes[0], true), (axes[1], read - true)):
+        curves(each, log["time"], values, ("pan", "tilt"), scale=180.0 / np.pi)
     draw_curve(axes[2], log["time"], off_center(log, pinhole), nth_look(2), "target's middle")
     rim = 0.5 * min(pinhole.width, pinhole.height)
     axes[2].axhline(rim, color="0.4", linestyle="--", label="nearest rim of the image")

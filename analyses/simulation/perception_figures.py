@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    curves,
+    draw_curve,
+    line_style,
+    new_figure,
+    plane,
+    spread,
+)
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure, spread
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_row, pose_rows_distance
 from cdpr_drake.palette import DISTANCE, ESTIMATED, TARGET, nth_look
@@ -26,9 +33,6 @@ INSTANT = 1e-3
 
 ROOM = 0.2
 """Round panels, so that a scale of colours is not read with the panel beside it [inch]."""
-
-COLORS = "cividis"
-"""Of distances: dark near, bright far, also in grey."""
 
 
 def looking_figures(
@@ -71,17 +75,13 @@ def _shown(log: Log) -> Array:
     return np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).round().astype(int))
 
 
-def _over_time(figure: Figure, axes: Any, times: Array, across: Array, values: Array) -> None:
-    """Distances by colour: time to the right, `across` upwards; what is not finite stays empty."""
-    shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
+def _over_time(axes: Any, times: Array, across: Array, values: Array) -> None:
+    """Distances by colour: time to the right, `across` upwards."""
     end = max(float(times[-1]), float(times[0]) + INSTANT)
     extent = (float(times[0]), end, float(across[0]), float(across[-1]))
-    image = axes.imshow(
-        shown.T, origin="lower", aspect="auto", extent=extent, cmap=COLORS, interpolation="nearest"
-    )
-    figure.colorbar(image, ax=axes, label="distance [m]")
+    distances = np.where(values > 0.0, values, np.nan).T
+    plane(axes, distances, "distance [m]", origin="lower", aspect="auto", extent=extent)
     axes.set(xlabel="time [s]")
-    axes.grid(visible=False)
 
 
 def scan_figure(title: str, log: Log, name: str, angles: Array) -> Figure:
@@ -99,7 +99,7 @@ def scan_figure(title: str, log: Log, name: str, angles: Array) -> Figure:
         return figure
     figure, axes = new_figure(1, 2, (13.0, 5.6), title)
     spread(figure, ROOM)
-    _over_time(figure, axes[0], times, angles, scans)
+    _over_time(axes[0], times, angles, scans)
     axes[0].set(ylabel="angle from the front [deg]")
     there = np.isfinite(scans[-1])
     turn = np.radians(angles[there])
@@ -123,11 +123,7 @@ def imu_figure(title: str, log: Log) -> Figure:
         (axes[1, 1], log["imu_biases"][:, 3:], 180.0 / np.pi, "bias, gyroscopes [deg/s]"),
     )
     for each, values, scale, label in panels:
-        for k, axis in enumerate("xyz"):
-            draw_curve(
-                each, log["time"], values[:, k], nth_look(k), axis,
-                scale=scale, phase=phase_of(k, 3),
-            )  # fmt: skip
+        curves(each, log["time"], values, "xyz", scale=scale)
         each.set(xlabel="time [s]", ylabel=label)
         each.legend(loc="best", ncols=3)
     return figure
@@ -140,15 +136,12 @@ def depth_figure(title: str, log: Log, image: Array | None) -> Figure:
     figure, panels = new_figure(1, 1 + (image is not None), (13.0, 5.2), title)
     spread(figure, ROOM)
     first = np.atleast_1d(panels)[0]
-    _over_time(figure, first, log["time"][rows], np.array([0.0, depth.shape[1]]), depth)
+    _over_time(first, log["time"][rows], np.array([0.0, depth.shape[1]]), depth)
     first.set(ylabel="u in the middle row [px]")
     if image is not None:
-        shown = np.where(np.isfinite(image) & (image > 0.0), image, np.nan)
-        drawn = panels[1].imshow(shown, cmap=COLORS, interpolation="nearest")
-        figure.colorbar(drawn, ax=panels[1], label="depth [m]")
+        plane(panels[1], np.where(image > 0.0, image, np.nan), "depth [m]")
         panels[1].set(xlabel="u [px]", ylabel="v [px]")
         panels[1].set_title("last image", fontsize=11)
-        panels[1].grid(visible=False)
     return figure
 
 
@@ -156,13 +149,9 @@ def pan_tilt_figure(title: str, log: Log) -> Figure:
     """Angles of the joints, and what their encoders say beyond them."""
     figure, axes = new_figure(2, 1, (10.0, 7.0), title)
     true, read = log["pan_tilt_angles"], log["pan_tilt_encoders"]
-    for k, name in enumerate(("pan", "tilt")):
-        for each, values in ((axes[0], true[:, k]), (axes[1], read[:, k] - true[:, k])):
-            draw_curve(
-                each, log["time"], values, nth_look(k), name,
-                scale=180.0 / np.pi, phase=phase_of(k, 2),
-            )  # fmt: skip
-    for each, label in zip(axes, ("angle [deg]", "encoder - angle [deg]"), strict=True):
+    panels = (true, "angle [deg]"), (read - true, "encoder - angle [deg]")
+    for each, (values, label) in zip(axes, panels, strict=True):
+        curves(each, log["time"], values, ("pan", "tilt"), scale=180.0 / np.pi)
         each.set(xlabel="time [s]", ylabel=label)
         each.legend(loc="best")
     return figure

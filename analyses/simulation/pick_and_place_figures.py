@@ -11,6 +11,16 @@ from matplotlib.figure import Figure
 from pydrake.geometry import Box, Meshcat
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    draw_curve,
+    figure_writers,
+    line_style,
+    new_figure,
+    phase_of,
+    shade,
+)
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
@@ -21,9 +31,6 @@ from cdpr_drake.analyses.simulation.pick_and_place_summary import (
     unseen,
 )
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of, shade
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.analyses.visualization.live_view import Prepare, live_pick_and_place
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.analyses.visualization.shown_things import ShownThing, ShownView, Surroundings

@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    curves,
+    draw_curve,
+    figure_writers,
+    line_style,
+    mark_instants,
+    new_figure,
+    shade,
+)
+from cdpr_drake.analyses.frame.thinning import by_pieces, path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_figure
 from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
@@ -24,18 +38,7 @@ from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_figure, world_words
 from cdpr_drake.analyses.simulation.wrench_report import wrench_figure
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.curves import (
-    by_pieces,
-    draw_curve,
-    mark_instants,
-    path_rows,
-    phase_of,
-    shade,
-)
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
-from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.palette import (
@@ -47,7 +50,6 @@ from cdpr_drake.palette import (
     IDEAL,
     PLATFORM,
     TARGET,
-    nth_look,
 )
 from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
@@ -66,44 +68,44 @@ def run_figures(result: RunResult, formats: Sequence[str] = DEFAULT_FORMATS) -> 
         "tensions": lambda: cable_curves_figure(result, "tensions"),
         "platform_path": lambda: platform_path_figure(result),
     }
+
+    def add(name: str, words: str, figure: Callable[..., Figure], *arguments: Any) -> None:
+        drawn[name] = partial(figure, _title(result, words), *arguments)
+
+    scenario = result.servo.scenario
     if "applied_torques" in log:
-        torques = _title(result, "Torques of the motors and of their friction")
-        drawn["motor_torques"] = lambda: motor_figure(torques, robot, log)
+        words = "Torques of the motors and of their friction"
+        add("motor_torques", words, motor_figure, robot, log)
     if "wanted_tensions" in log:
-        loop = _title(
-            result, "Tensions that a servo by torque wants, and what there is beyond them"
-        )
-        limits = tension_limits(result.servo.scenario, robot)
-        drawn["tension_loop"] = lambda: tension_loop_figure(loop, robot, log, limits)
+        words = "Tensions that a servo by torque wants, and what there is beyond them"
+        limits = tension_limits(scenario, robot)
+        add("tension_loop", words, tension_loop_figure, robot, log, limits)
     if shows_loops(robot):
-        does = _title(result, "What cables and contacts of the platform went through")
-        drawn["behaviour"] = lambda: loop_figure(does, robot, log)
-    sensors = result.servo.scenario.sensors
+        words = "What cables and contacts of the platform went through"
+        add("behaviour", words, loop_figure, robot, log)
+    sensors = scenario.sensors
     if sensors.log:
-        readings = _title(result, "What the sensors read beyond the truth")
-        drawn["readings"] = lambda: reading_figure(readings, robot, log, sensors)
+        words = "What the sensors read beyond the truth"
+        add("readings", words, reading_figure, robot, log, sensors)
     if sensors.looks_round():
         drawn |= looking_figures(
-            lambda words: _title(result, words), sensors, log, result.servo.motion,
-            result.depth_image,
-        )  # fmt: skip
+            partial(_title, result), sensors, log, result.servo.motion, result.depth_image
+        )
     if WRENCH_ESTIMATED in log:
-        pushed = _title(result, "What pushes the platform beside its cables, true and estimated")
-        drawn["wrench"] = lambda: wrench_figure(pushed, log)
+        words = "What pushes the platform beside its cables, true and estimated"
+        add("wrench", words, wrench_figure, log)
     if LEARNT in log:
-        learnt = _title(result, "Exit and anchor points learnt on the way, and the truth")
-        drawn["adaptation"] = lambda: adaptation_figure(learnt, log, robot)
+        words = "Exit and anchor points learnt on the way, and the truth"
+        add("adaptation", words, adaptation_figure, log, robot)
     if LOGGED_JOINTS in log:
-        turned = _title(result, "Joints of the camera, and where the target is in its image")
-        drawn["camera_joints"] = lambda: camera_joints_figure(turned, log, result.servo.pinhole)
-    world = result.servo.scenario.world
-    if world is not None:
-        around = _title(result, world_words(world))
-        drawn["world"] = lambda: world_figure(around, world, log)
+        words = "Joints of the camera, and where the target is in its image"
+        add("camera_joints", words, camera_joints_figure, log, result.servo.pinhole)
+    if scenario.world is not None:
+        add("world", world_words(scenario.world), world_figure, scenario.world, log)
     along = stability_of_run(result)
     if along is not None:
-        words = _title(result, "Cables that pull, and stability of the servo")
-        drawn["stability"] = lambda: stability_figure(words, along)
+        words = "Cables that pull, and stability of the servo"
+        add("stability", words, stability_figure, along)
     return dict(figure_writers(drawn, formats))
 
 
@@ -136,12 +138,9 @@ def image_path_figure(result: RunResult) -> Figure:
         image.plot(*path[0], "o", color=TARGET.color, label="start")
     image.plot(*line[1], DESIRED.marker, color=DESIRED.color, markersize=14, label="desired")
     image.set(
-        xlim=(0, pinhole.width),
-        ylim=(pinhole.height, 0),
-        xlabel="u [px]",
-        ylabel="v [px]",
+        xlim=(0, pinhole.width), ylim=(pinhole.height, 0), xlabel="u [px]", ylabel="v [px]",
         aspect=pinhole.fx / pinhole.fy,
-    )
+    )  # fmt: skip
     image.set_title(f"image of {pinhole.width} x {pinhole.height} px", fontsize=11)
     image.legend(loc="best")
     if seen:
@@ -182,13 +181,9 @@ def error_figure(result: RunResult) -> Figure:
     for axes, unit in zip(grid[0], shown if looked else (), strict=False):
         label, factor = _UNITS[unit]
         mine = [k for k in range(len(units)) if units[k] == unit]
-        for place, k in enumerate(mine):
-            error = np.where(gain > 0.0, log["error"][:, k], np.nan)
-            name = features.names[k].removesuffix(f"_{unit}")
-            draw_curve(
-                axes, time, error, nth_look(k), name,
-                scale=factor, phase=phase_of(place, len(mine)),
-            )  # fmt: skip
+        errors = np.where(gain[:, np.newaxis] > 0.0, log["error"][:, mine], np.nan)
+        names = [features.names[k].removesuffix(f"_{unit}") for k in mine]
+        curves(axes, time, errors, names, numbers=mine, scale=factor)
         shade(axes, time, unseen, "target not seen")
         axes.set(ylabel=label)
         axes.legend(loc="best", ncols=1 + len(mine) // 6)
@@ -245,39 +240,31 @@ def cable_curves_figure(result: RunResult, quantity: str) -> Figure:
 def platform_path_figure(result: RunResult) -> Figure:
     """Paths of platform and camera: with the whole robot, and close up."""
     servo, log = result.servo, result.log
-    rows, estimated = path_rows(log["X_WP"][:, 4:]), path_rows(log["X_WP_estimated"][:, 4:])
+    rows, estimated = (path_rows(log[name][:, 4:]) for name in ("X_WP", "X_WP_estimated"))
     X_WPs = [pose_from_row(row) for row in log["X_WP"][rows]]
-    target = np.array(
+    X_WCs = [servo.mounting.X_WC(X_WP) for X_WP in X_WPs]
+    points = np.array([X.translation() for X in X_WCs])
+    goals = np.array(
         [
-            (servo.mounting.X_WC(X_WP) @ servo.X_CO(X_WP, time)).translation()
-            for X_WP, time in zip(X_WPs, log["time"][rows], strict=True)
+            (X_WC @ servo.X_CO(X_WP, time)).translation()
+            for X_WC, X_WP, time in zip(X_WCs, X_WPs, log["time"][rows], strict=True)
         ]
     )
-    camera = np.array([servo.mounting.X_WC(X_WP).translation() for X_WP in X_WPs])
+    camera, target = Path3D(points, "camera, Co", CAMERA), Path3D(goals, "target, Oo", TARGET)
     paths = [
-        Path3D(np.array([X_WP.translation() for X_WP in X_WPs]), "platform, Po", PLATFORM),
-        Path3D(_positions(log["X_WP_estimated"], estimated), "platform, Po, estimated", ESTIMATED),
-    ]
+        Path3D(np.array([X.translation() for X in X_WPs]), "platform, Po", PLATFORM),
+        Path3D(
+            np.asarray(log["X_WP_estimated"][estimated][:, 4:]), "platform, Po, estimated",
+            ESTIMATED,
+        ),
+    ]  # fmt: skip
     if servo.mounting.is_eye_to_hand():
-        paths += [
-            Path3D(target, "target, Oo", TARGET),
-            Path3D(camera[:1], "camera, Co", CAMERA),
-        ]
+        paths += [target, replace(camera, points=points[:1])]
     elif servo.motion.is_moving():
-        paths += [
-            Path3D(camera, "camera, Co", CAMERA),
-            Path3D(target, "target, Oo", TARGET),
-        ]
+        paths += [camera, target]
     else:
-        paths += [
-            Path3D(camera, "camera, Co", CAMERA),
-            Path3D(camera_line(result), "camera, straight line", IDEAL),
-            Path3D(target[:1], "target, Oo", TARGET),
-        ]
+        line = Path3D(camera_line(result), "camera, straight line", IDEAL)
+        paths += [camera, line, replace(target, points=goals[:1])]
     cables = servo.scenario.cables.cable_set(servo.robot)
     words = "Paths of platform P, camera C and target O in the world frame W"
     return path_figure(_title(result, words), servo.robot, cables, log, paths)
-
-
-def _positions(rows_of_poses: Array, rows: Array) -> Array:
-    return np.asarray(rows_of_poses[rows][:, 4:])

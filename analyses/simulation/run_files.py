@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
@@ -14,7 +15,6 @@ from cdpr_drake.analyses.simulation.run_figures import run_figures
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
 from cdpr_drake.analyses.simulation.worlds import world_columns
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.visualization.replay import write_replay
 
 FILM = "camera.mp4"

@@ -12,6 +12,14 @@ from typing import Annotated, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    draw_curve,
+    line_style,
+    new_figure,
+    shade,
+    write_figures,
+)
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import Formats, OutFolder, words
@@ -21,9 +29,6 @@ from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.simulation.run_stability import StabilityAlong, stability_along
 from cdpr_drake.analyses.simulation.visual_servo_run import unfinished_run
-from cdpr_drake.analyses.visualization.curves import draw_curve, shade
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, write_figures
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, OutputFolderError, why_not_read
 from cdpr_drake.palette import BOUND, DISTANCE, LOST, PLATFORM

@@ -13,6 +13,14 @@ from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
+from cdpr_drake.analyses.frame.figures import (
+    DEFAULT_FORMATS,
+    draw_curve,
+    figure_writers,
+    new_figure,
+    shade,
+)
+from cdpr_drake.analyses.frame.thinning import by_pieces, path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, finite, spread, write_json, write_log
 from cdpr_drake.analyses.reporting.log_on_disk import Log
@@ -46,9 +54,6 @@ from cdpr_drake.analyses.simulation.worlds import (
     world_words,
 )
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.curves import by_pieces, draw_curve, path_rows, shade
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.analyses.visualization.shown_things import Surroundings

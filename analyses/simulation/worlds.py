@@ -7,11 +7,17 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    LEGEND_BESIDE,
+    curves,
+    draw_curve,
+    line_style,
+    new_figure,
+    shade,
+)
 from cdpr_drake.analyses.reporting.log_on_disk import Log
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of, shade
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.palette import BOUND, DISTANCE, nth_look
+from cdpr_drake.palette import BOUND, DISTANCE
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
@@ -116,18 +122,15 @@ def world_figure(title: str, world: WorldSettings, log: Log) -> Figure:
         (panels[1], "cable_clearance", "clearance of the cables [mm]"),
     ):
         shown = [k for k in range(len(names)) if np.any(np.isfinite(log[quantity][:, k]))]
-        for place, k in enumerate(shown):
-            draw_curve(
-                axes, times, log[quantity][:, k], nth_look(k), names[k],
-                scale=1e3, phase=phase_of(place, len(shown)),
-            )  # fmt: skip
+        labels = [names[k] for k in shown]
+        curves(axes, times, log[quantity][:, shown], labels, numbers=shown, scale=1e3)
         axes.axhline(0.0, **line_style(BOUND))
         axes.set(xlabel="time [s]", ylabel=label)
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        axes.legend(**LEGEND_BESIDE)
     if touching:
         force = np.linalg.norm(log["contact_force"], axis=1)
         draw_curve(panels[2], times, force, DISTANCE, "force on the platform")
         shade(panels[2], times, log["contact_count"][:, 0] > 0.0, "in contact")
         panels[2].set(xlabel="time [s]", ylabel="contact force [N]", ylim=(0.0, None))
-        panels[2].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+        panels[2].legend(**LEGEND_BESIDE)
     return figure

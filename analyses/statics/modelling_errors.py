@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.analyses.frame.figures import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import CATENARY, ELASTIC, INEXTENSIBLE
 from cdpr_drake.geometry.cable_set import CableSet

@@ -10,12 +10,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.spatial import ConvexHull, QhullError
 
-from cdpr_drake.analyses.visualization.figure_style import (
+from cdpr_drake.analyses.frame.figures import (
+    LEGEND_BESIDE,
     bar_style,
     bare_figure,
     few_ticks,
     line_style,
-    new_figure,
+    panels,
     styled,
 )
 from cdpr_drake.arrays import Array
@@ -80,12 +81,11 @@ def rest_figure(rest: RobotAtRest, title: str) -> Figure:
         place.set_title(view)
         _not_flat(place)
         place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
-    axes["above"].legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    axes["above"].legend(**LEGEND_BESIDE)
     place = axes["tensions"]
-    places = np.arange(len(rest.l0))
     for k, tension in enumerate(rest.tensions):
         place.bar(k, tension, **bar_style(nth_look(k)))
-    place.set_xticks(places, rest.names)
+    place.set_xticks(range(len(rest.l0)), rest.names)
     place.set(ylabel="tension at the platform [N]")
     low, high = rest.robot.tension_limits()
     for bound in (low, high):
@@ -149,13 +149,10 @@ def behaviour_figure(rest: RobotAtRest) -> Figure:
         )
     title = f"{robot.name}: what cables and contacts do, by its file"
     rows, columns = -(-len(parts) // 2), min(len(parts), 2)
-    figure, panels = new_figure(rows, columns, (5.2 * columns + 0.6, 4.6 * rows + 0.2), title)
-    places = np.atleast_1d(panels).ravel()
-    for axes, draw in zip(places, parts, strict=False):
-        draw(axes)
-        axes.legend(loc="best")
-    for axes in places[len(parts) :]:
-        axes.remove()
+    figure, axes = panels(len(parts), 2, (5.2 * columns + 0.6, 4.6 * rows + 0.2), title)
+    for each, draw in zip(axes, parts, strict=True):
+        draw(each)
+        each.legend(loc="best")
     return figure
 
 

@@ -23,11 +23,11 @@ from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask,
 from cdpr_drake.analyses.calibration.calibration_task import calibrate
 from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.simulation.run_summary import camera_path
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
 from cdpr_drake.calibration.measurements import (

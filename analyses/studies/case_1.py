@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import bar_style, new_figure
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.caroca_cases import (
     AS_PRINTED,
@@ -45,7 +46,6 @@ from cdpr_drake.analyses.studies.servo_figures import (
     paths,
 )
 from cdpr_drake.analyses.studies.study import Frame
-from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import repeatability
 from cdpr_drake.geometry.poses import pose_from_row

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.sparse.csgraph import connected_components
 
+from cdpr_drake.analyses.frame.figures import bar_style, new_figure
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.servo_figures import (
     IMAGE,
@@ -31,7 +32,6 @@ from cdpr_drake.analyses.studies.slack import (
     mean_tensions,
 )
 from cdpr_drake.analyses.studies.study import Frame
-from cdpr_drake.analyses.visualization.figure_style import bar_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import PLATFORM, PUBLISHED, SOLID, nth_look
 from cdpr_drake.tensions.methods import distribute, feasible_polygon, solution_space

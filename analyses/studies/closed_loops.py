@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.perturbed_servo import (
@@ -31,7 +32,6 @@ from cdpr_drake.analyses.studies.perturbed_servo import (
     servo_case,
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError

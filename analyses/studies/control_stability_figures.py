@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import COVERED_LINE, few_ticks, line_style, new_figure
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.recipe_variants import (
@@ -26,12 +27,6 @@ from cdpr_drake.analyses.studies.stability_tables import (
     nested_pairs,
 )
 from cdpr_drake.analyses.studies.study import Frame
-from cdpr_drake.analyses.visualization.figure_style import (
-    COVERED_LINE,
-    few_ticks,
-    line_style,
-    new_figure,
-)
 from cdpr_drake.palette import PUBLISHED
 from cdpr_drake.palette import VERDICTS as LOOKS
 from cdpr_drake.stability.verdict import VERDICTS

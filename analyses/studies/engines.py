@@ -18,16 +18,16 @@ from matplotlib.ticker import NullLocator
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
-from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
-from cdpr_drake.analyses.visualization.figure_style import (
+from cdpr_drake.analyses.frame.figures import (
     bar_style,
     bare_figure,
     line_style,
     plain_numbers,
     styled,
 )
+from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_rows_distance

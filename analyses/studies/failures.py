@@ -38,6 +38,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
+from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
 from cdpr_drake.analyses.simulation.break_report import (
     BRAKE,
     NONE,
@@ -48,7 +49,6 @@ from cdpr_drake.analyses.simulation.break_report import (
 )
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
-from cdpr_drake.analyses.visualization.figure_style import new_figure, plain_numbers
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.break_detection import detectable_tension
 from cdpr_drake.models.robot_loader import load_robot

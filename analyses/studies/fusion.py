@@ -14,11 +14,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.experiments import wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import logarithm, pose_from_row, pose_rows_distance

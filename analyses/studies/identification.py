@@ -22,9 +22,9 @@ from cdpr_drake.analyses.calibration.identification_campaign import (
     run_dynamic_campaign,
 )
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
+from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.studies.calibration import by_degrees, draw_chi_square
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet

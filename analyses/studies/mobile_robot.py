@@ -16,18 +16,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.frame.figures import (
+    bar_style,
+    draw_curve,
+    line_style,
+    new_figure,
+    phase_of,
+    plain_numbers,
+)
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.rows import Row
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import (
-    bar_style,
-    line_style,
-    new_figure,
-    plain_numbers,
-)
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot, robot_reference

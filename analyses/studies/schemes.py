@@ -16,9 +16,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import load_robot

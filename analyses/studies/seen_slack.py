@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.figures import new_figure
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, summary
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

@@ -16,16 +16,19 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from cdpr_drake.analyses.frame.figures import (
+    bar_style,
+    bare_figure,
+    draw_curve,
+    line_style,
+    phase_of,
+    shade,
+    styled,
+)
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.analyses.simulation.stability_files import draw_steps
 from cdpr_drake.analyses.studies.study import Frame
-from cdpr_drake.analyses.visualization.curves import draw_curve, path_rows, phase_of, shade
-from cdpr_drake.analyses.visualization.figure_style import (
-    bar_style,
-    bare_figure,
-    line_style,
-    styled,
-)
 from cdpr_drake.analyses.visualization.path_figures import set_box
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_row

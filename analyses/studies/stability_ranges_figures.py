@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.studies.study import Frame, select
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.palette import BOUND, IDEAL, OUTCOMES, PUBLISHED, VERDICTS, Look, nth_look
 
 PLANAR_VISION = "3.2.1, planar: analyses I and II"

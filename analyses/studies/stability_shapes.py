@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cdpr_drake.analyses.frame.figures import bare_figure, new_figure
 from cdpr_drake.analyses.studies.rows import Row
 from cdpr_drake.analyses.studies.stability_recipe import (
     RECIPE,
@@ -28,7 +29,6 @@ from cdpr_drake.analyses.studies.stability_recipe import (
 )
 from cdpr_drake.analyses.studies.stability_tables import BASELINE_VALUES, BY_NAME
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
 from cdpr_drake.analyses.workspaces.servo_stability import PRINTED
 from cdpr_drake.arrays import Array

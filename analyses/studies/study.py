@@ -23,6 +23,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
@@ -38,7 +39,6 @@ from cdpr_drake.analyses.studies.facts import (
     scorecard,
 )
 from cdpr_drake.analyses.studies.rows import Call, Plan, Row, RowStore, check_earlier, digest
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.typed_yaml import closest

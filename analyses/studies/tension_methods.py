@@ -11,11 +11,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    bar_style,
+    draw_curve,
+    line_style,
+    new_figure,
+    phase_of,
+)
 from cdpr_drake.analyses.studies import tension_trials as tt
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.tensions import applicable_methods
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import bar_style, line_style, new_figure
 from cdpr_drake.control.force_balance import FORCE, WRENCH
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem

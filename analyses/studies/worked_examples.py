@@ -13,12 +13,11 @@ from math import perm
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import draw_curve, new_figure, phase_of
 from cdpr_drake.analyses.reporting.timing import interleaved, processor_seconds
 from cdpr_drake.analyses.studies.rows import Row
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.analyses.studies.tension_trials import TRUTH, grid_problems
-from cdpr_drake.analyses.visualization.curves import draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot

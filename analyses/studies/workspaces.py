@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cdpr_drake.analyses.frame.figures import bar_style, bare_figure, new_figure
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
-from cdpr_drake.analyses.visualization.figure_style import bar_style, bare_figure, new_figure
 from cdpr_drake.analyses.visualization.solids import draw_solid
 from cdpr_drake.analyses.workspaces.conditions import (
     OF_POSES,

@@ -1,4 +1,4 @@
-"""Figures and pages that runs and studies share: style, cables, solids, the replay of a run."""
+"""Pictures that runs and studies share: cables, paths, solids, robots in a browser, replays."""
 
 import lazy_loader
 

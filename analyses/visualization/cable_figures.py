@@ -1,4 +1,4 @@
-"""Figures with one curve a cable: tensions with their bounds and who is slack when, lengths, ..."""
+"""Figures with one curve a cable: tensions with their bounds, slack cables, lengths, speeds."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from typing import Any, Protocol
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.visualization.curves import (
-    by_pieces,
+from cdpr_drake.analyses.frame.figures import (
+    LEGEND_BESIDE,
+    bare_figure,
+    curves,
     draw_bars,
-    draw_curve,
-    phase_of,
+    line_style,
     shade,
+    styled,
 )
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
+from cdpr_drake.analyses.frame.thinning import by_pieces
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, nth_look
 
 NEAR = 1.5
-"""A bound is drawn where it is at most this times as large as the largest tension; one farther off
-would press the curves flat, and is put into words."""
+"""Bounds up to so many times the largest tension are drawn; a farther one would press the curves
+flat, and is put into words."""
 
 
 class HasCables(Protocol):
@@ -33,16 +35,10 @@ class HasCables(Protocol):
 
 
 def cable_figure(
-    title: str,
-    robot: HasCables,
-    log: Mapping[str, Array],
-    quantity: str,
-    label: str,
-    *,
-    scale: float = 1.0,
-    bounds: tuple[float, float] | None = None,
-) -> Figure:
-    """One curve a cable; of tensions also their bounds, and below which cable is slack and when.
+    title: str, robot: HasCables, log: Mapping[str, Array], quantity: str, label: str, *,
+    scale: float = 1.0, bounds: tuple[float, float] | None = None,
+) -> Figure:  # fmt: skip
+    """One curve a cable; below tensions, bars show when each cable is slack.
 
     Args:
         title: Title.
@@ -50,33 +46,32 @@ def cable_figure(
         log: "time", shape (n,) [s], "slack" and the quantity, shape (n, m).
         quantity: Its name in the log.
         label: Words and unit of its axis.
-        scale: Factor from the log's unit to that of the axis.
-        bounds: Smallest and largest tension [N], for tensions; None: no bounds and no bars.
-            Without, the times in which some cable is slack are shaded.
+        scale: Factor from the log's unit to the unit of the axis.
+        bounds: Smallest and largest tension [N], for tensions; None: no bounds and no bars, and the
+            times in which a cable is slack are shaded.
     """
     times, slack = log["time"], log["slack"]
-    some_slack = by_pieces(lambda rows: np.any(rows > 0.0, axis=1), slack[:-1])
-    bars = bounds is not None and bool(np.any(some_slack))
-    figure = bare_figure((10.0, 5.0 + (0.5 + 0.22 * len(robot.cables)) * bars), title)
+    any_slack = by_pieces(lambda rows: np.any(rows > 0.0, axis=1), slack[:-1])
+    with_bars = bounds is not None and bool(np.any(any_slack))
+    heights = [4.2, 0.5 + 0.2 * len(robot.cables)] if with_bars else [1.0]
+    extra = 0.5 + 0.22 * len(robot.cables) if with_bars else 0.0
+    figure = bare_figure((10.0, 5.0 + extra), title)
     with styled():
-        if bars:
-            heights = (4.2, 0.5 + 0.2 * len(robot.cables))
-            axes, band = figure.subplots(2, 1, sharex=True, height_ratios=heights)
-        else:
-            axes = band = figure.subplots(1, 1)
+        panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights, squeeze=False)
+        axes, last = panels[0, 0], panels[-1, 0]
         draw_cables(axes, robot, times, log[quantity], scale)
         if bounds is not None:
-            _draw_bounds(axes, bounds, words="" if bars else "no cable is slack")
-        elif len(some_slack):
-            shade(axes, times, np.append(some_slack, False), "some cable slack")
+            _draw_bounds(axes, bounds, words="" if with_bars else "no cable is slack")
+        elif len(any_slack):
+            shade(axes, times, np.append(any_slack, False), "some cable slack")
         axes.set(ylabel=label)
-        band.set(xlabel="time [s]")
+        last.set(xlabel="time [s]")
         axes.margins(x=0.01)
-        axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        if bars:
+        axes.legend(**LEGEND_BESIDE)
+        if with_bars:
             rows = [(c.name, nth_look(k), slack[:, k]) for k, c in enumerate(robot.cables)]
-            draw_bars(band, times, rows)
-            band.set_ylabel("slack cable [-]")
+            draw_bars(last, times, rows)
+            last.set_ylabel("slack cable")
     return figure
 
 
@@ -84,17 +79,7 @@ def draw_cables(
     axes: Any, robot: HasCables, times: Array, values: Array, scale: float = 1.0
 ) -> None:
     """Draws a curve for each cable in its own look; values of shape (n, m)."""
-    count = len(robot.cables)
-    for k, cable in enumerate(robot.cables):
-        draw_curve(
-            axes,
-            times,
-            values[:, k],
-            nth_look(k),
-            cable.name,
-            scale=scale,
-            phase=phase_of(k, count),
-        )
+    curves(axes, times, values, [cable.name for cable in robot.cables], scale=scale)
 
 
 def _draw_bounds(axes: Any, bounds: tuple[float, float], words: str) -> None:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
+from cdpr_drake.analyses.frame.figures import bare_figure, line_style, styled
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.cables.models import KELVIN_VOIGT
@@ -44,11 +44,7 @@ class Path3D:
 
 
 def path_figure(
-    title: str,
-    robot: Robot,
-    cables: CableSet,
-    log: Mapping[str, Array],
-    paths: Sequence[Path3D],
+    title: str, robot: Robot, cables: CableSet, log: Mapping[str, Array], paths: Sequence[Path3D]
 ) -> Figure:
     """Paths in 3D: with the whole robot and its platform at start and end, and close up.
 
@@ -97,11 +93,9 @@ def path_figure(
 
 
 def poses_figure(
-    title: str,
-    robot: Robot,
-    poses: Mapping[str, RigidTransform],
+    title: str, robot: Robot, poses: Mapping[str, RigidTransform],
     slack: Sequence[np.ndarray] | None = None,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """A robot with its platform at one pose or several, in 3D.
 
     Args:
@@ -132,17 +126,11 @@ def poses_figure(
     return figure
 
 
-def set_box(axes: Any, lower: Array, upper: Array) -> None:
+def set_box(axes: Any, lower: Array, upper: Array, zoom: float = 0.92) -> None:
     """Shows a box of the world frame W in its true proportions; corners of shape (3,) [m]."""
-    axes.set(
-        xlim=(lower[0], upper[0]),
-        ylim=(lower[1], upper[1]),
-        zlim=(lower[2], upper[2]),
-        xlabel="x in W [m]",
-        ylabel="y in W [m]",
-        zlabel="z in W [m]",
-    )
-    axes.set_box_aspect(upper - lower, zoom=0.92)
+    for letter, low, high in zip("xyz", lower, upper, strict=True):
+        axes.set(**{f"{letter}lim": (low, high), f"{letter}label": f"{letter} in W [m]"})
+    axes.set_box_aspect(upper - lower, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         # The last number of one axis and the first of the next would stand in the same corner.
         axis.set_major_locator(MaxNLocator(4, prune="both"))
@@ -170,33 +158,21 @@ def _draw_path(axes: Any, path: Path3D, phase: float) -> None:
 def _draw_cables(
     axes: Any, cables: CableSet, X_WP: RigidTransform, slack: np.ndarray, look: Look | None = None
 ) -> None:
-    """Cables at a pose, drawn straight behind their pulleys, dotted where slack; with one look
-    for all, or each its own."""
+    """Draws cables at a pose straight behind their pulleys, dotted where slack, in their looks."""
     straight = cable_curves(cables, KELVIN_VOIGT, X_WP, np.zeros(cables.count))
     for number, (curve, loose) in enumerate(zip(straight, slack, strict=True)):
-        axes.plot(
-            *curve,
-            color=(look or nth_look(number)).color,
-            linestyle=DOTTED if loose else SOLID,
-            linewidth=0.9,
-        )
+        color, dash = (look or nth_look(number)).color, DOTTED if loose else SOLID
+        axes.plot(*curve, color=color, linestyle=dash, linewidth=0.9)
 
 
 def _draw_platform(
-    axes: Any,
-    robot: Robot,
-    X_WP: RigidTransform,
-    dash: Dash,
-    label: str | None,
+    axes: Any, robot: Robot, X_WP: RigidTransform, dash: Dash, label: str | None,
     color: str = OUTLINE.color,
-) -> None:
+) -> None:  # fmt: skip
     """The edges of the platform's box."""
     for number, edge in enumerate(platform_edges(robot)):
-        ends = X_WP.multiply(edge)
-        axes.plot(
-            *ends, color=color, linestyle=dash, linewidth=1.1,
-            label=label if number == 0 else None,
-        )  # fmt: skip
+        once = label if number == 0 else None
+        axes.plot(*X_WP.multiply(edge), color=color, linestyle=dash, linewidth=1.1, label=once)
 
 
 def platform_edges(robot: Robot) -> list[Array]:

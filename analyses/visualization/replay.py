@@ -1,28 +1,28 @@
-"""Meshcat scenes and recordings that open in a browser without a server."""
+"""Robots in Meshcat: as one page that opens without a server, and runs as recordings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
-from cdpr_drake.analyses.visualization.curves import path_rows
+from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
-from cdpr_drake.analyses.visualization.replay_page import PageNotes, with_notes
-from cdpr_drake.analyses.visualization.replay_signals import (
+from cdpr_drake.analyses.visualization.replay_page import (
     CameraView,
     camera_signals,
     film_images,
     frame_signals,
     tension_curves,
+    with_notes,
 )
 from cdpr_drake.analyses.visualization.shown_things import (
+    ALONE,
     ShownThing,
     ShownView,
     Surroundings,
@@ -44,11 +44,10 @@ from cdpr_drake.models.robot_holding import rest_as_long
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing.servo_task import CameraMounting
-from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.systems.diagrams.camera import pictured_robot
 from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
-from cdpr_drake.systems.robots.cable_robot import CableRobot, holding_tensions
+from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.settings import CableSettings
 from cdpr_drake.systems.worlds.settings import WorldSettings
 from cdpr_drake.vision.pinhole import Pinhole
@@ -64,16 +63,16 @@ CLOCK = 1000.0
 `REPLAY_RATE`, and then put 1.16 s, which is 28.999... steps, into the frame before its own."""
 
 MOST_FRAMES = 15_000
-"""Frames of a recording at most: ten minutes at the full rate; longer ones have fewer a second."""
+"""Largest number of frames: ten minutes at the full rate; longer recordings have a lower rate."""
 
 LARGEST_PAGE = 60_000_000
-"""Size of a page with a recording at most [bytes]; one with more has fewer frames a second."""
+"""Largest size of a page with a recording [bytes]; a larger one gets fewer frames a second."""
 
 BYTES_EACH = 260
-"""What one body in one frame takes of a page, about [bytes]: it is 247 with its scale."""
+"""Size of one body in one frame of a page, about [bytes]: it is 247 with its scale."""
 
 FEWEST_FRAMES, SAMPLED_FRAMES = 50, 60
-"""Frames of a recording at least, and how many are looked at to see what one takes."""
+"""Smallest number of frames of a recording, and number of rows that tell the size of a frame."""
 
 TRACE_BINS = 500
 """Pieces of a path drawn into a scene, each by its extremes."""
@@ -86,34 +85,37 @@ class RobotPicture:
     """A robot in Meshcat that can be posed, with its scene and cables.
 
     Attributes:
-        meshcat: Where it is shown.
+        meshcat: The Meshcat that shows it.
         problem: Why the cables are grey, in one line; empty where their tensions are known.
+        title: Of its page.
     """
 
     def __init__(
-        self,
-        robot: Robot,
-        full_scale: float,
-        scenario: Scenario | None = None,
-        cables: CableSettings | None = None,
-        *,
-        meshcat: Meshcat | None = None,
-        world: WorldSettings | None = None,
-        colors: Sequence[str] | None = None,
-        look: bool = True,
-    ) -> None:
-        """Shows a robot, the target of a scenario, and the kind of cables that is given.
+        self, robot: Robot, full_scale: float, scenario: Scenario | None = None,
+        cables: CableSettings | None = None, *, meshcat: Meshcat | None = None,
+        world: WorldSettings | None = None, colors: Sequence[str] | None = None, look: bool = True,
+    ) -> None:  # fmt: skip
+        """Shows a robot.
 
-        `full_scale` colours the cables [N]; it is shown in `meshcat`, or in one of its own. A
-        `world` is that of a scenario of another kind; `colors` are those of cables that are not
-        slack, in the place of those of tensions. Without `look`, whoever looks at the scene keeps
-        the view.
+        Args:
+            robot: The robot.
+            full_scale: Tension of the last colour of cables [N].
+            scenario: A visual servo, whose target is shown, too.
+            cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
+            meshcat: Where to show it; None: a new one.
+            world: World of a scenario of another kind.
+            colors: Of cables that are not slack, #rrggbb; None: by their tensions.
+            look: True to look at the robot; else the view stays.
         """
         self.meshcat = open_meshcat() if meshcat is None else meshcat
-        self.problem = ""
-        self._block, self._diagram, self._visualizer = _visualized(
-            robot, scenario, world, self.meshcat
-        )
+        self.problem, self.title = "", "" if scenario is None else scenario.title
+        builder = DiagramBuilder()
+        self._block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
+        self._visualizer = MeshcatVisualizer.AddToBuilder(
+            builder, self._block.GetOutputPort("query_object"), self.meshcat,
+            MeshcatVisualizerParams(publish_period=1.0 / CLOCK),  # of recordings alone
+        )  # fmt: skip
+        self._diagram = builder.Build()
         self._context: Context = self._diagram.CreateDefaultContext()
         self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
         for path in transparent_paths(self._block.scene_graph.model_inspector()):
@@ -121,23 +123,20 @@ class RobotPicture:
         if cables is None and scenario is not None:
             cables = scenario.cables
         self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables, colors=colors)
-        self._robot, self._full_scale = robot, full_scale
+        self._robot, self._full_scale, self._known = robot, full_scale, True
         self._lines: list[tuple[str, Look]] = []
-        self._known = True
-        self.title = "" if scenario is None else scenario.title
+        frame = robot.frame
+        self._depth = FRUSTUM * float(np.linalg.norm(frame.upper - frame.lower))
         if look:
-            look_at(self.meshcat, robot.frame.lower, robot.frame.upper)
+            look_at(self.meshcat, frame.lower, frame.upper)
 
     def draw(
-        self,
-        X_WP: RigidTransform,
-        tensions: Array,
-        time: float | None = None,
+        self, X_WP: RigidTransform, tensions: Array, time: float | None = None,
         unstrained_lengths: Array | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Draws the platform at X_WP [m] and its cables; arguments as `CablePictures.draw`.
 
-        Where no tension is known, the page of the scene says so, and has no scale of tensions.
+        If no tension is known, the page of the scene says so, and has no scale of tensions.
         """
         self._known = not np.all(np.isnan(tensions))
         plant = self._block.plant
@@ -159,7 +158,7 @@ class RobotPicture:
 
     def show_camera(self, pinhole: Pinhole) -> None:
         """Draws what a camera sees as a pyramid, for `place_camera`."""
-        starts, ends = frustum(pinhole, self._depth())
+        starts, ends = frustum(pinhole, self._depth)
         self.meshcat.SetLineSegments("camera/view", starts, ends, 2.0, Rgba(*rgb(CAMERA.color)))
         self._lines.append(("view of the camera", CAMERA))
 
@@ -169,55 +168,26 @@ class RobotPicture:
 
     def show_things(self, things: Sequence[ShownThing | ShownView]) -> None:
         """Shows what is neither robot nor world, where frames are W, for a `ThingMover`."""
-        self._lines += show_things(self.meshcat, things, self._depth())
-
-    def _depth(self) -> float:
-        """To which what a camera sees is drawn [m]."""
-        frame = self._robot.frame
-        return FRUSTUM * float(np.linalg.norm(frame.upper - frame.lower))
+        self._lines += show_things(self.meshcat, things, self._depth)
 
     def start_recording(self) -> None:
         """From now on, `draw` with a time writes into the recording."""
         self._visualizer.StartRecording(set_transforms_while_recording=False)
 
-    def html(self) -> str:
-        """The scene as one page that needs no server."""
-        return self._page({})
+    def html(self, **signals: Any) -> str:
+        """The scene as one page that needs no server, with its recording if there is one.
 
-    def recording_html(
-        self,
-        frames: dict[str, Any],
-        curves: dict[str, Any],
-        camera: dict[str, Any] | None = None,
-    ) -> str:
-        """The scene with its recording, and beside it what `replay_signals` made of its run."""
-        self.meshcat.StopRecording()
-        self.meshcat.PublishRecording()
-        return self._page({"frames": frames, "curves": curves, "camera": camera})
-
-    def _page(self, signals: dict[str, Any]) -> str:
-        notes = PageNotes(
-            names=[cable.name for cable in self._robot.cables],
-            places=self._robot.cable_set().p_WA,
-            full_scale=self._full_scale,
-            known=self._known,
-            title=self.title,
-            lines=self._lines,
-            **signals,
-        )
-        return with_notes(self.meshcat.StaticHtml(), notes)
-
-
-def _visualized(
-    robot: Robot, scenario: Scenario | None, world: WorldSettings | None, meshcat: Meshcat
-) -> tuple[CableRobot, Diagram, MeshcatVisualizer]:
-    builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
-    params = MeshcatVisualizerParams(publish_period=1.0 / CLOCK)  # of recordings alone
-    visualizer = MeshcatVisualizer.AddToBuilder(
-        builder, block.GetOutputPort("query_object"), meshcat, params
-    )
-    return block, builder.Build(), visualizer
+        Args:
+            signals: Frames, curves and camera of the recording, for `with_notes`.
+        """
+        if signals:
+            self.meshcat.StopRecording()
+            self.meshcat.PublishRecording()
+        return with_notes(
+            self.meshcat.StaticHtml(), [cable.name for cable in self._robot.cables],
+            self._robot.cable_set().p_WA, self._full_scale, title=self.title, lines=self._lines,
+            known=self._known, **signals,
+        )  # fmt: skip
 
 
 def look_at(meshcat: Meshcat, lower: Array, upper: Array) -> None:
@@ -236,9 +206,8 @@ def look_at(meshcat: Meshcat, lower: Array, upper: Array) -> None:
     meshcat.SetProperty("/Background/<object>", "bottom_color", [0.98, 0.98, 0.98])
 
 
-def robot_html(robot: Robot) -> str:
-    """A page that shows a robot as `robot_picture` does."""
-    return robot_picture(robot).html()
+UNHELD = (CableGeometryError, EquilibriumError, InfeasibleTensionError, TensionProblemError)
+"""Refusals of tensions that hold a platform."""
 
 
 def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
@@ -254,13 +223,8 @@ def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
             tensions = holding.tensions
         else:
             tensions = holding_tensions(robot, X_WP)
-    except (
-        CableGeometryError,
-        EquilibriumError,
-        InfeasibleTensionError,
-        TensionProblemError,
-    ) as found:
-        tensions, problem = np.full(len(robot.cables), np.nan), str(found)
+    except UNHELD as refusal:
+        tensions, problem = np.full(len(robot.cables), np.nan), str(refusal)
     # Twice the largest tension, so that colours also tell the home pose from full load.
     full_scale = robot.tension_limits()[1] if problem else 2.0 * float(np.max(tensions))
     picture = RobotPicture(robot, full_scale, cables=CableSettings(pulleys=True), meshcat=meshcat)
@@ -271,18 +235,11 @@ def robot_picture(robot: Robot, meshcat: Meshcat | None = None) -> RobotPicture:
 
 
 def write_replay(
-    path: Path,
-    robot: Robot,
-    log: Mapping[str, Array],
-    scenario: Scenario | None = None,
-    cables: CableSettings | None = None,
-    camera: tuple[CameraMounting, Pinhole] | None = None,
-    *,
-    around: Surroundings | None = None,
-    view: CameraView | None = None,
-    limits: tuple[float, float] | None = None,
-    title: str = "",
-) -> None:
+    path: Path, robot: Robot, log: Mapping[str, Array], scenario: Scenario | None = None,
+    cables: CableSettings | None = None, camera: tuple[CameraMounting, Pinhole] | None = None, *,
+    around: Surroundings = ALONE, view: CameraView | None = None,
+    limits: tuple[float, float] | None = None, title: str = "",
+) -> None:  # fmt: skip
     """Writes the recording of a run as one HTML file of at most `LARGEST_PAGE`.
 
     Args:
@@ -294,128 +251,98 @@ def write_replay(
         scenario: A visual servo's scenario, whose target is shown too.
         cables: The kind of cables; None: the scenario's, or straight from fixed exit points.
         camera: Where a camera is, and how it sees; None: there is none.
-        around: What is round the robot in a scenario of another kind.
+        around: What is around the robot in a scenario of another kind.
         view: What the camera saw, which is shown beside the scene; None: nothing is.
-        limits: Smallest and largest tension that are shown with the tensions [N]; None: those of
-            the robot.
+        limits: Smallest and largest tension that are shown with the tensions [N]; None: the
+            robot's.
         title: Of the page; empty: the scenario's.
     """
-    world, things = (None, ()) if around is None else (around.world, around.things)
-    curves = tension_curves(log, limits or robot.tension_limits())
-    images = film_images(view)
+    curves, images = tension_curves(log, limits or robot.tension_limits()), film_images(view)
+    times, joints = log["time"], None if scenario is None else scenario.camera.pan_tilt
 
-    def page(most: int) -> Recorded:
-        picture = _scene(robot, log, scenario, cables, camera, world=world)
+    def scene() -> RobotPicture:
+        full_scale = float(np.max(log["tensions"]))
+        picture = RobotPicture(robot, full_scale, scenario, cables, world=around.world)
         picture.title = title or picture.title
-        picture.show_things(things)
-        most = min(most, _affordable_frames(picture, log, len(things)))
-        joints = None if scenario is None else scenario.camera.pan_tilt
-        shown, frames = _record(picture, log, camera, most, things, joints)
-        seen = None if view is None else camera_signals(view, log, shown, images)
-        return Recorded(picture.recording_html(frames, curves, seen), len(shown), most)
+        points = log["X_WP"][:, 4:]
+        picture.show_trace("platform, Po", points, PLATFORM)
+        if camera is not None:
+            mounting, pinhole = camera
+            picture.show_camera(pinhole)
+            if not mounting.is_eye_to_hand():
+                poses = map(pose_from_row, log["X_WP"][path_rows(points, TRACE_BINS)])
+                path_of_camera = np.array([mounting.X_WC(X_WP).translation() for X_WP in poses])
+                picture.show_trace("camera, Co", path_of_camera, CAMERA)
+        return picture
 
-    def still() -> str:
-        return _scene(robot, log, scenario, cables, camera, world=world).html()
+    def page(most: int) -> tuple[str, int]:
+        picture = scene()
+        picture.show_things(around.things)
+        most = min(most, affordable_frames(picture, log, len(around.things)))
+        shown = frame_indices(times, REPLAY_RATE, most)
+        # A log on disk is read once, and only what is shown.
+        poses, tensions = log["X_WP"][shown], log["tensions"][shown]
+        unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
+        angles = None if joints is None else log[LOGGED_JOINTS][shown]
+        slack = np.zeros(tensions.shape, bool)
+        mover = ThingMover(picture.meshcat, around.things, log, shown)
+        picture.start_recording()
+        for frame, time in enumerate(map(float, times[shown])):
+            X_WP = pose_from_row(poses[frame])
+            lengths = None if unstrained is None else unstrained[frame]
+            picture.draw(X_WP, tensions[frame], time, lengths)
+            mover.place(frame, time)
+            slack[frame] = picture.cables.slack(tensions[frame], lengths)
+            if camera is not None:
+                mounting = camera[0]
+                if joints is not None and angles is not None:
+                    mounting = turned_mounting(mounting, joints, angles[frame])
+                picture.place_camera(mounting.X_WC(X_WP), time)
+        html = picture.html(
+            frames=frame_signals(log, shown, slack), curves=curves,
+            camera=None if view is None else camera_signals(view, log, shown, images),
+        )  # fmt: skip
+        return html, len(shown)
 
-    path.write_text(fitting_page(page, still), encoding="utf-8")
+    path.write_text(fitting_page(page, lambda: scene().html()), encoding="utf-8")
 
 
-@dataclass(frozen=True)
-class Recorded:
-    """A page with a recording: its frames, and how many were allowed."""
-
-    html: str
-    frames: int
-    most: int
-
-
-def fitting_page(page: Callable[[int], Recorded], still: Callable[[], str]) -> str:
+def fitting_page(page: Callable[[int], tuple[str, int]], still: Callable[[], str]) -> str:
     """A page of at most `LARGEST_PAGE`, with as many frames as that allows.
 
     Args:
-        page: Makes it with at most so many frames.
+        page: Makes it with at most so many frames; returns it with the number of its frames.
         still: The same without a recording.
     """
     most = MOST_FRAMES
     while True:
-        made = page(most)
-        if len(made.html) <= LARGEST_PAGE or made.most <= FEWEST_FRAMES:
-            return made.html
+        html, frames = page(most)
+        if len(html) <= LARGEST_PAGE or frames <= FEWEST_FRAMES:
+            return html
         bare = len(still())
-        room = max(LARGEST_PAGE - bare, 0) / (len(made.html) - bare)
-        most = max(FEWEST_FRAMES, int(0.9 * min(made.most, made.frames) * room))
-        del made
+        room = max(LARGEST_PAGE - bare, 0) / (len(html) - bare)
+        most = max(FEWEST_FRAMES, int(0.9 * frames * room))
+        del html
 
 
-def _scene(
-    robot: Robot,
-    log: Mapping[str, Array],
-    scenario: Scenario | None,
-    cables: CableSettings | None,
-    camera: tuple[CameraMounting, Pinhole] | None,
-    *,
-    world: WorldSettings | None,
-) -> RobotPicture:
-    """What stands still in a replay: the robot, the traces, the shape of what a camera sees."""
-    picture = RobotPicture(robot, float(np.max(log["tensions"])), scenario, cables, world=world)
-    poses = log["X_WP"]
-    points = poses[:, 4:]
-    picture.show_trace("platform, Po", points, PLATFORM)
-    if camera is not None:
-        mounting, pinhole = camera
-        picture.show_camera(pinhole)
-        if not mounting.is_eye_to_hand():
-            rows = path_rows(points, TRACE_BINS)
-            X_WCs = [mounting.X_WC(pose_from_row(row)) for row in poses[rows]]
-            picture.show_trace("camera, Co", np.array([X.translation() for X in X_WCs]), CAMERA)
-    return picture
-
-
-def _affordable_frames(picture: RobotPicture, log: Mapping[str, Array], things: int) -> int:
-    """How many frames a page has room for, by how many rods the cables take at some times."""
+def affordable_frames(picture: RobotPicture, log: Mapping[str, Array], things: int) -> int:
+    """Number of frames for which a page has room, by the rods that the cables take at some rows."""
     unstrained = log.get("unstrained_lengths")
     if unstrained is None:
         rods = log["tensions"].shape[1]
     else:
-        some = np.unique(np.linspace(0, len(log["time"]) - 1, SAMPLED_FRAMES).astype(int))
-        poses = log["X_WP"][some]
+        sample = sampled_rows(log)
         rods = max(
             picture.cables.rods(pose_from_row(pose), lengths)
-            for pose, lengths in zip(poses, unstrained[some], strict=True)
+            for pose, lengths in zip(log["X_WP"][sample], unstrained[sample], strict=True)
         )
     others = 3 + things  # platform, camera, target
     return max(FEWEST_FRAMES, int(LARGEST_PAGE / (BYTES_EACH * (rods + others))))
 
 
-def _record(
-    picture: RobotPicture,
-    log: Mapping[str, Array],
-    camera: tuple[CameraMounting, Pinhole] | None,
-    most: int,
-    things: Sequence[Any] = (),
-    joints: CameraPanTilt | None = None,
-) -> tuple[list[int], dict[str, Any]]:
-    """Records at most so many frames; rows of the log that they show, and their numbers."""
-    times = log["time"]  # a log on disk is read where it is looked at: once, only what is shown
-    shown = frame_indices(times, REPLAY_RATE, most)
-    poses, tensions = log["X_WP"][shown], log["tensions"][shown]
-    unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
-    slack = np.zeros(tensions.shape, bool)
-    angles = None if joints is None else log[LOGGED_JOINTS][shown]
-    mover = ThingMover(picture.meshcat, things, log, shown)
-    picture.start_recording()
-    for frame, time in enumerate(times[shown]):
-        X_WP = pose_from_row(poses[frame])
-        lengths = None if unstrained is None else unstrained[frame]
-        picture.draw(X_WP, tensions[frame], float(time), lengths)
-        mover.place(frame, float(time))
-        slack[frame] = picture.cables.slack(tensions[frame], lengths)
-        if camera is not None:
-            mounting = camera[0]
-            if joints is not None and angles is not None:
-                mounting = turned_mounting(mounting, joints, angles[frame])
-            picture.place_camera(mounting.X_WC(X_WP), float(time))
-    return shown, frame_signals(log, shown, slack)
+def sampled_rows(log: Mapping[str, Array]) -> np.ndarray:
+    """At most `SAMPLED_FRAMES` rows of a log, evenly over it."""
+    return np.unique(np.linspace(0, len(log["time"]) - 1, SAMPLED_FRAMES).astype(int))
 
 
 def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[int]:
@@ -428,9 +355,9 @@ def frame_indices(times: Array, rate: float, most: int = MOST_FRAMES) -> list[in
     """
     duration = float(times[-1] - times[0])
     period = max(1.0 / rate, duration / max(most - 1, 1))
-    wanted = np.arange(times[0], times[-1] + 0.5 * period, period)
-    after = np.clip(np.searchsorted(times, wanted), 1, max(len(times) - 1, 1))
+    instants = np.arange(times[0], times[-1] + 0.5 * period, period)
+    after = np.clip(np.searchsorted(times, instants), 1, max(len(times) - 1, 1))
     before = after - 1
     last = np.minimum(after, len(times) - 1)
-    nearer = np.where(wanted - times[before] <= times[last] - wanted, before, last)
+    nearer = np.where(instants - times[before] <= times[last] - instants, before, last)
     return np.unique(nearer).tolist()

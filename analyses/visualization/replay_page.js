@@ -75,7 +75,9 @@
   choice.parentElement.append(" names of the cables");
   const names = data.names.map((name, k) => {
     const made = add(pane, "div", "cdpr-name", name);
-    themed.push(() => { made.style.borderBottomColor = color(data.looks[k]); });
+    if (data.scale === 0) {  // else they have the colours of their cables, by tension
+      themed.push(() => { made.style.borderBottomColor = color(data.looks[k]); });
+    }
     return made;
   });
   function times(m, v) {  // a column-major matrix of three.js on a vector of four
@@ -293,6 +295,11 @@
           c.value.textContent = hangs ? "slack " + words : words;
           c.value.dataset.newtons = value;
           c.cell.classList.toggle("cdpr-slack", hangs);
+          if (data.scale > 0) {
+            const level = Math.min(Math.floor(data.colors.length * value / data.scale),
+              data.colors.length - 1);
+            names[k].style.borderBottomColor = hangs ? data.slack : data.colors[level] || "";
+          }
         }),
       };
     }

@@ -10,10 +10,10 @@ import numpy as np
 from cdpr_drake.analyses.visualization.solids import VIEW
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.palette import COLORS, OUTLINE, PLATFORM
+from cdpr_drake.palette import COLORS, OUTLINE, PLATFORM, rgb
 
 WIDTH, HEIGHT, MARGIN = 280.0, 210.0, 14.0
-"""Of a thumbnail, and what is left free round the robot [px]."""
+"""Of a thumbnail, and what is left free around the robot [px]."""
 
 FLAT = 1e-6
 """Robots whose cables are this near to one height [m] are seen from above."""
@@ -77,34 +77,33 @@ def _article(robot: Robot) -> str:
 
 def thumbnail(robot: Robot) -> str:
     """A robot at its home pose as an SVG element."""
-    cables = robot.cable_set()
-    X_WP = robot.home.transform()
-    R, p = X_WP.rotation().matrix(), X_WP.translation()[:, np.newaxis]
-    anchors = R @ cables.p_PB + p
+    cables, X_WP = robot.cable_set(), robot.home.transform()
     lower, upper = np.asarray(robot.frame.lower), np.asarray(robot.frame.upper)
-    frame = (lower + _CORNERS * (upper - lower)).T
-    size, middle = np.asarray(robot.platform.size), robot.box_center()
-    box = R @ (middle + (_CORNERS - 0.5) * size).T + p
-    toward, view = _view(_is_flat(cables.p_WA, anchors))
-    everything = np.hstack([frame, cables.p_WA, anchors, box])
-    place = _Placer(view @ everything)
-    lines = _frame_lines(place(view @ frame))
-    starts, ends = place(view @ cables.p_WA), place(view @ anchors)
-    for index, (start, end) in enumerate(zip(starts.T, ends.T, strict=True)):
+    anchors = X_WP.multiply(cables.p_PB)
+    box_P = robot.box_center() + (_CORNERS - 0.5) * np.asarray(robot.platform.size)
+    points = [(lower + _CORNERS * (upper - lower)).T, cables.p_WA, anchors, X_WP.multiply(box_P.T)]
+    flat = np.ptp(np.concatenate([cables.p_WA[2], anchors[2]])) < FLAT
+    toward, view = _view(bool(flat))
+    # Into the middle of the picture, as large as its margins allow [px].
+    seen = view @ np.hstack(points)
+    low, high = seen.min(axis=1), seen.max(axis=1)
+    size = np.array([WIDTH, HEIGHT])
+    scale = float(np.min((size - 2.0 * MARGIN) / np.maximum(high - low, 1e-9)))
+    frame, exits, ends, box = (
+        0.5 * size + scale * ((view @ each).T - 0.5 * (low + high)) for each in points
+    )
+    edges = "".join(f"M{_at(frame[i])}L{_at(frame[j])}" for i, j in _EDGES)
+    lines = [f'<path class="frame" d="{edges}"/>']
+    for index, (start, end) in enumerate(zip(exits, ends, strict=True)):
         color = COLORS[index % len(COLORS)]
         lines.append(f'<path class="cable" stroke="{color}" d="M{_at(start)}L{_at(end)}"/>')
-    lines += _box_faces(place(view @ box), R.T @ toward)
-    for x, y in starts.T:
-        lines.append(f'<path class="exit" d="M{x:.1f} {y - 4:.1f}l4 7h-8z"/>')
+    lines += _box_faces(box, X_WP.rotation().matrix().T @ toward)
+    lines += [f'<path class="exit" d="M{x:.1f} {y - 4:.1f}l4 7h-8z"/>' for x, y in exits]
     title = escape(f"{robot.name} at its home pose")
     return (
         f'<svg viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img"><title>{title}</title>'
         f"{''.join(lines)}</svg>"
     )
-
-
-def _is_flat(exits: Array, anchors: Array) -> bool:
-    return bool(np.ptp(np.concatenate([exits[2], anchors[2]])) < FLAT)
 
 
 def _view(flat: bool) -> tuple[Array, Array]:
@@ -117,42 +116,20 @@ def _view(flat: bool) -> tuple[Array, Array]:
     return toward, np.array([right, -np.cross(toward, right)])
 
 
-class _Placer:
-    """Takes points in the view, shape (2, k) [m], to the thumbnail [px]."""
-
-    def __init__(self, everything: Array) -> None:
-        low, high = everything.min(axis=1), everything.max(axis=1)
-        room = np.array([WIDTH, HEIGHT]) - 2.0 * MARGIN
-        self._scale = float(np.min(room / np.maximum(high - low, 1e-9)))
-        self._middle = 0.5 * (low + high)
-
-    def __call__(self, points: Array) -> Array:
-        center = 0.5 * np.array([[WIDTH], [HEIGHT]])
-        return np.asarray(center + self._scale * (points - self._middle[:, np.newaxis]))
-
-
 def _at(point: Array) -> str:
     return f"{point[0]:.1f} {point[1]:.1f}"
 
 
-def _frame_lines(corners: Array) -> list[str]:
-    edges = "".join(f"M{_at(corners[:, i])}L{_at(corners[:, j])}" for i, j in _EDGES)
-    return [f'<path class="frame" d="{edges}"/>']
-
-
 def _box_faces(corners: Array, toward_P: Array) -> list[str]:
-    """The three faces of the platform that are seen; toward_P is the viewer's direction in P."""
+    """The faces of the platform that are seen; toward_P is the viewer's direction in P."""
     faces = []
     for axis in range(3):
-        near = _FACES[2 * axis + (1 if toward_P[axis] > 0.0 else 0)]
         if abs(toward_P[axis]) > 1e-9:
-            outline = "L".join(_at(corners[:, corner]) for corner in near)
-            color = _shaded(PLATFORM.color, _SHADES[axis])
+            face = _FACES[2 * axis + (1 if toward_P[axis] > 0.0 else 0)]
+            outline = "L".join(_at(corners[corner]) for corner in face)
+            share = _SHADES[axis]  # 0: the platform's colour, 1: white
+            color = "#" + "".join(
+                f"{round(255.0 * (c + share * (1.0 - c))):02x}" for c in rgb(PLATFORM.color)
+            )
             faces.append(f'<path class="face" fill="{color}" d="M{outline}Z"/>')
     return faces
-
-
-def _shaded(color: str, share: float) -> str:
-    """A colour lightened: 0 as it is, 1 white."""
-    channels = [int(color[k : k + 2], 16) for k in (1, 3, 5)]
-    return "#" + "".join(f"{round(c + share * (255 - c)):02x}" for c in channels)

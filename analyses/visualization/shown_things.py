@@ -63,7 +63,7 @@ class ShownView:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What is round a robot in a replay.
+    """What is around a robot in a replay.
 
     Attributes:
         world: Section of a scenario; None: nothing.
@@ -72,6 +72,10 @@ class Surroundings:
 
     world: WorldSettings | None = None
     things: tuple[ShownThing | ShownView, ...] = ()
+
+
+ALONE = Surroundings()
+"""A robot without anything around it."""
 
 
 def show_things(
@@ -98,16 +102,13 @@ def show_things(
 
 
 class ThingMover:
-    """Moves things to where a log says."""
+    """Moves things to where a log says; things that stand stay where they are."""
 
     def __init__(
-        self,
-        meshcat: Meshcat,
-        things: Sequence[ShownThing | ShownView],
-        log: Mapping[str, Array],
-        rows: Sequence[int],
-    ) -> None:
-        """For the rows of a log that are shown; things that stand stay where they are."""
+        self, meshcat: Meshcat, things: Sequence[ShownThing | ShownView],
+        log: Mapping[str, Array], rows: Sequence[int],
+    ) -> None:  # fmt: skip
+        """Takes the rows of a log that are shown."""
         self._meshcat = meshcat
         self._poses = {
             thing.name: np.asarray(log[thing.quantity])[list(rows)]

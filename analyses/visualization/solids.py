@@ -6,7 +6,7 @@ are for what is transparent there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from cdpr_drake.palette import OUTLINE
 
 if TYPE_CHECKING:
     from matplotlib.lines import Line2D
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 VIEW = 22.0, -58.0
 """Elevation and azimuth from which solids are seen [deg]."""
@@ -41,61 +40,46 @@ def draw_solid(
     Returns:
         What a legend may name: exit points, frame.
     """
-    lower, upper = frame
+    from matplotlib.colors import LightSource  # heavy, and a scene in Meshcat needs none of it
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    from cdpr_drake.analyses.visualization.path_figures import set_box
+
     if len(quads):
-        axes.add_collection3d(_shaded(quads, color))
+        light = LightSource(azdeg=200.0, altdeg=45.0)
+        axes.add_collection3d(
+            Poly3DCollection(
+                quads, facecolors=color, edgecolors=color, linewidths=0.2, zorder=2, shade=True,
+                lightsource=light,
+            )
+        )  # fmt: skip
     else:
         axes.text2D(
             0.5, 0.3, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9,
             zorder=6, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5, "alpha": 0.85},
         )  # fmt: skip
-    edge = _draw_frame(axes, lower, upper)
+    edge = _draw_frame(axes, *frame)
     handles = [*axes.plot(*exits, "k^", markersize=4, zorder=4, label="exit points of the cables")]
-    axes.set(xlabel="x in W [m]", ylabel="y in W [m]", zlabel="z in W [m]")
-    axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-    axes.set_box_aspect(upper - lower, zoom=0.9)
+    set_box(axes, *frame, zoom=0.7)  # labels of narrow panels need room
+    axes.xaxis.labelpad, axes.zaxis.labelpad = 11.0, 9.0
     axes.view_init(*VIEW)
-    axes.tick_params(labelsize=9)
-    axes.locator_params(nbins=4)
-    axes.zaxis.labelpad = 4.0
     return [*handles, edge]
 
 
-def _shaded(quads: Array, color: str) -> Poly3DCollection:
-    from matplotlib.colors import LightSource  # heavy, and a scene in Meshcat needs none of it
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
-    return Poly3DCollection(
-        quads,
-        facecolors=color,
-        edgecolors=color,
-        linewidths=0.2,
-        zorder=2,
-        shade=True,
-        lightsource=LightSource(azdeg=200.0, altdeg=45.0),
-    )
-
-
 def _draw_frame(axes: Any, lower: Array, upper: Array) -> Line2D:
-    """The twelve edges of the frame, those at the nearest corner before the solid; one of them."""
-    ends: Sequence[Array] = (lower, upper)
+    """The twelve edges of the frame, edges at the nearest corner before the solid; one of them."""
     elevation, azimuth = np.radians(VIEW)
     nearest = np.where([np.cos(azimuth) > 0, np.sin(azimuth) > 0, elevation > 0], upper, lower)
     for along in range(3):
         u, v = (along + 1) % 3, (along + 2) % 3
-        for a in ends:
-            for b in ends:
-                edge = np.empty((3, 2))
-                edge[along] = lower[along], upper[along]
-                edge[u], edge[v] = a[u], b[v]
-                near = a[u] == nearest[u] and b[v] == nearest[v]
-                (line,) = axes.plot(
-                    *edge,
-                    color=OUTLINE.color,
-                    linewidth=0.8,
-                    zorder=3 if near else 1,
-                    label="frame",
-                )
+        for a, b in product((lower, upper), repeat=2):
+            edge = np.empty((3, 2))
+            edge[along] = lower[along], upper[along]
+            edge[u], edge[v] = a[u], b[v]
+            near = a[u] == nearest[u] and b[v] == nearest[v]
+            (line,) = axes.plot(
+                *edge, color=OUTLINE.color, linewidth=0.8, zorder=3 if near else 1, label="frame"
+            )
     return line
 
 
@@ -104,23 +88,18 @@ VISUALIZER = "visualizer"
 
 
 def add_solid(
-    meshcat: Meshcat,
-    path: str,
-    vertices: Array,
-    faces: np.ndarray,
-    color: Rgba,
-    *,
+    meshcat: Meshcat, path: str, vertices: Array, faces: np.ndarray, color: Rgba, *,
     visible: bool = True,
-) -> None:
+) -> None:  # fmt: skip
     """Shows triangles in W.
 
     Args:
-        meshcat: Where.
-        path: In its tree.
+        meshcat: Meshcat.
+        path: Path in its tree.
         vertices: Shape (n, 3) [m].
         faces: Numbers of the corners of each triangle, shape (k, 3).
         color: With its opacity.
-        visible: Whether they are shown, or wait in the menu.
+        visible: True to show them; else they wait in the menu.
     """
     corners = np.asarray(faces.T, np.int32)
     meshcat.SetTriangleMesh(path, np.asarray(vertices.T, float), corners, color)

@@ -279,7 +279,7 @@ def _figure_file(word: str) -> tuple[str, Path]:
 
 
 def _save(figure: Any, path: Path) -> None:
-    from cdpr_drake.analyses.visualization.figure_files import save_figure
+    from cdpr_drake.analyses.frame.figures import save_figure
 
     save_figure(figure, path)
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.visualization import new_figure
+from cdpr_drake.analyses.frame import new_figure
 
 ROBOT = "acrobot_large"
 MASSES = (1.0, 1.5, 2.0, 2.5, 3.0)  # [kg]

@@ -10,8 +10,8 @@ from scipy.io import loadmat
 
 from cdpr_drake.analyses.frame.files import copy_new
 from cdpr_drake.analyses.programs import NOTEBOOKS
-from cdpr_drake.analyses.visualization.live_view import LiveView
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, page_address
+from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.errors import MeshcatError, OutputFolderError
 from cdpr_drake.models.robot_loader import robot_file
 from tests.cli.commands import ended, refuse, run, told
@@ -83,18 +83,18 @@ def test_meshcat_listens_where_it_is_told():
 @pytest.mark.usefixtures("without_pictures")
 def test_a_live_run_has_the_same_numbers(capsys, here, monkeypatch, scenario):
     drawn = []
-    draw = LiveView.draw
+    draw = RobotPicture.draw
 
     def watched(self, *arguments):
-        drawn.append(arguments[0])
+        drawn.append(arguments[2])
         draw(self, *arguments)
 
-    monkeypatch.setattr(LiveView, "draw", watched)
+    monkeypatch.setattr(RobotPicture, "draw", watched)
     words = ("simulate", *scenario, "--duration", "0.3")
     code, _, err = run(capsys, *words, "--out", "live", "--meshcat")
     assert code == 0
     assert f"{scenario[0]} at http://localhost:" in err
-    assert len(drawn) >= 7  # 25 a second
+    assert len(drawn) >= 8  # before the start, and 25 a second
     assert ended(*words, "--out", "plain") == 0
     logs = [(here / name / "log.csv").read_bytes() for name in ("live", "plain")]
     assert logs[0] == logs[1]

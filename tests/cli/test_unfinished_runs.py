@@ -360,7 +360,7 @@ def told(name):
 def test_a_fit_that_ends_while_its_figures_are_drawn_is_made_again(asked, here, monkeypatch):
     words = asked(here)
     with monkeypatch.context() as patch:
-        figures = "cdpr_drake.analyses.visualization.figure_files.write_pictures"
+        figures = "cdpr_drake.analyses.frame.figures.write_pictures"
         patch.setattr(figures, end_at_once)
         with pytest.raises(Ended):
             ended(*words)

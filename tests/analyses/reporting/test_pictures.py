@@ -10,8 +10,6 @@ from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import write_whole
 from cdpr_drake.analyses.reporting.output_folder import results_folder
 from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
-from cdpr_drake.analyses.visualization.figure_files import figure_writers
-from cdpr_drake.analyses.visualization.figure_style import new_figure
 
 
 class Figure:
@@ -33,21 +31,6 @@ def test_each_is_gone_before_the_next_is_drawn(tmp_path):
     assert gc.get_threshold() == thresholds
     assert alive == [0, 0, 0]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "c"]
-
-
-def test_a_figure_in_several_formats_is_gone_after_the_last(tmp_path):
-    alive = []
-
-    def draw():
-        figure = new_figure(1, 1, (2.0, 2.0), "x")[0]
-        alive.append(weakref.ref(figure))
-        return figure
-
-    writers = figure_writers({"one": draw}, ("svg", "pdf"))
-    last = {"two.txt": lambda path: path.write_text(str(alive[0]()))}
-    assert write_pictures(tmp_path, {**writers, **last}) == {}
-    assert len(alive) == 1
-    assert (tmp_path / "two.txt").read_text() == "None"
 
 
 def test_one_that_fails_leaves_no_part_and_the_next_is_drawn(tmp_path):

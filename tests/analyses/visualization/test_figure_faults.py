@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.frame.figures import bare_figure, new_figure, styled
 from cdpr_drake.analyses.studies.servo_figures import fit_box, path
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, new_figure, styled
 from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
 from cdpr_drake.palette import nth_look
 from tests.figure_faults import figure_faults

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
-from cdpr_drake.analyses.visualization.mechanism_picture import route_points
-from cdpr_drake.analyses.visualization.mechanism_replay import write_mechanism_replay
+from cdpr_drake.analyses.visualization.mechanism_replay import (
+    route_points,
+    write_mechanism_replay,
+)
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from tests.analyses.visualization.test_replay_in_browser import opened, scrub, shown_time

@@ -8,7 +8,7 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
-from cdpr_drake.analyses.visualization.figure_style import new_figure
+from cdpr_drake.analyses.frame.figures import new_figure
 from cdpr_drake.models.robot_loader import load_robot
 
 

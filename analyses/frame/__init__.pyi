@@ -1,0 +1,9 @@
+from .figures import bar_style as bar_style
+from .figures import bars as bars
+from .figures import curves as curves
+from .figures import draw_curve as draw_curve
+from .figures import figure_writers as figure_writers
+from .figures import new_figure as new_figure
+from .figures import panels as panels
+from .figures import plane as plane
+from .figures import write_figures as write_figures
