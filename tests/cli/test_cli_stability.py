@@ -147,8 +147,8 @@ from pathlib import Path
 from cdpr_drake.analyses.workspaces import grid_runs
 from cdpr_drake.cli.app import main
 
-def slow(parts, job):
-    Path(f"began-{job[1]}").touch()
+def slow(work, span):
+    Path(f"began-{span[0]}").touch()
     time.sleep(1e6)
 
 grid_runs.chunk_arrays = slow
