@@ -6,8 +6,7 @@ import json
 import re
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -28,16 +27,10 @@ ARGUMENTS = "arguments.json"
 """What the sweep was asked for; another sweep may not use the folder."""
 
 CHUNKS = "chunks"
-"""Folder of the chunks, one file each; gone once the results are written."""
-
-PARTS = "parts.npz"
-"""All arrays of a sweep that was finished, `task/name` each; the chunks are gone then."""
+"""Folder of the chunks, one file each."""
 
 OWN_FILE = re.compile(r"arguments\.json|[a-z_]+\.npz")
 """Names of files of which a killed process may have left one in the making in the folder."""
-
-OWN_CHUNK = re.compile(r".+-\d{7,}-\d{7,}\.npz")
-"""Names of chunks."""
 
 NAMED_DIFFERENCES = 3
 """So many differences between arguments are named in an error."""
@@ -46,28 +39,7 @@ LONGEST_VALUE = 40
 """A value of more characters is not written out in an error."""
 
 
-class KeptChunks:
-    """Chunks on disk, and all arrays of a sweep that was finished, to be read."""
-
-    def __init__(self, folder: Path) -> None:
-        """Reads what is in one file; chunks are read when they are asked for."""
-        self.folder = folder.absolute()
-        self._whole: dict[str, dict[str, np.ndarray]] = {}
-        for key, array in (load_arrays(self.folder / PARTS) or {}).items():
-            task, _, name = key.rpartition("/")
-            self._whole.setdefault(task, {})[name] = array
-
-    def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
-        """The arrays of items start to stop of a task; None if not there or damaged."""
-        if task in self._whole:
-            return {name: array[start:stop] for name, array in self._whole[task].items()}
-        return load_arrays(self._chunk(task, start, stop))
-
-    def _chunk(self, task: str, start: int, stop: int) -> Path:
-        return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"
-
-
-class SweepFolder(KeptChunks):
+class SweepFolder:
     """Chunks on disk under the arguments that they were computed for.
 
     A chunk's file appears whole or not at all, so whatever ends the program, what is there can
@@ -93,7 +65,6 @@ class SweepFolder(KeptChunks):
             raise OutputFolderError(
                 f"{self.folder}: cannot be written: {problem.strerror}"
             ) from problem
-        super().__init__(folder)
 
     def _open(self, words: str) -> None:
         stored = self.folder / ARGUMENTS
@@ -117,49 +88,27 @@ class SweepFolder(KeptChunks):
         if not stored.is_file():
             write_whole(stored, words + "\n")
 
+    def load(self, task: str, start: int, stop: int) -> dict[str, np.ndarray] | None:
+        """The arrays of items start to stop of a task; None if not there or damaged."""
+        return load_arrays(self._chunk(task, start, stop))
+
+    def _chunk(self, task: str, start: int, stop: int) -> Path:
+        return self.folder / CHUNKS / f"{task}-{start:07d}-{stop:07d}.npz"
+
     def store(self, task: str, start: int, stop: int, arrays: dict[str, np.ndarray]) -> None:
         """Keeps the arrays of a chunk.
 
         Raises:
             OutputFolderError: The folder cannot be written, for instance on a full disk.
         """
-        with self._writing():
+        try:
             (self.folder / CHUNKS).mkdir(exist_ok=True)
             store_arrays(self._chunk(task, start, stop), arrays)
-
-    @contextmanager
-    def _writing(self) -> Iterator[None]:
-        try:
-            yield
         except OSError as problem:
             raise OutputFolderError(
                 f"{self.folder}: cannot be written: {problem.strerror}; what was finished "
                 "before is kept, and found by the same command"
             ) from problem
-
-    def finish(self, arrays: Mapping[str, Mapping[str, np.ndarray]]) -> None:
-        """Keeps the arrays of all tasks in one file in the place of the chunks.
-
-        Raises:
-            OutputFolderError: The folder cannot be written.
-        """
-        if not self._whole:
-            self._whole = {task: dict(mine) for task, mine in arrays.items()}
-            flat = {
-                f"{t}/{name}": array for t, mine in arrays.items() for name, array in mine.items()
-            }
-            with self._writing():
-                store_arrays(self.folder / PARTS, flat)
-        self.forget_chunks()
-
-    def forget_chunks(self) -> None:
-        """Removes the chunks, once what they make up is written elsewhere, and nothing else."""
-        chunks = self.folder / CHUNKS
-        with suppress(OSError):
-            for path in chunks.iterdir():
-                if OWN_CHUNK.fullmatch(whole_name(path.name) or path.name):
-                    path.unlink()
-            chunks.rmdir()
 
 
 def check_sweep_folder(folder: Path) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 from cdpr_drake.blas_threads import started_with_one_thread
 from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
@@ -50,7 +50,6 @@ def run_jobs(
     should_stop: Callable[[], bool] | None = None,
     *,
     on_lost: Callable[[int], None] | None = None,
-    standing: PersistentPool | None = None,
 ) -> Iterator[tuple[int, Result]]:
     """Does jobs in processes and yields each as it is finished.
 
@@ -72,7 +71,6 @@ def run_jobs(
         on_lost: Called with the index of a job whose process died, for instance out of memory; the
             others go on. None: that is an error. Jobs that ran beside it are done again, one by
             one, so that it is known which it was.
-        standing: Processes that are there already and stay afterwards, in the place of `workers`.
 
     Yields:
         Index of the job and its result.
@@ -82,11 +80,9 @@ def run_jobs(
         BrokenProcessPool: A process died and nobody listens.
     """
     count = min(workers or default_workers(), max(len(jobs), 1))
-    if standing is not None:
-        count = standing.count
     stop = should_stop or (lambda: False)
     waiting, suspects = deque(range(len(jobs))), deque[int]()
-    if count == 1 or (workers is None and standing is None):
+    if count == 1 or workers is None:
         before, shortest, others = resident_memory(), math.inf, False
         while waiting and not others:
             if stop():
@@ -102,7 +98,7 @@ def run_jobs(
             )
         if not waiting:
             return
-    pool = standing or PersistentPool(count)
+    pool = _Pool(count)
     running: dict[Future[tuple[Result, bool]], int] = {}
     alone = False  # whether what runs is a suspect, with nobody beside it
     grown = False  # whether a process keeps too much memory
@@ -110,7 +106,7 @@ def run_jobs(
         while True:
             broken = False
             if grown and not running:
-                pool.renew()
+                pool = pool.followed()
                 grown = False
             while (
                 not grown
@@ -123,7 +119,7 @@ def run_jobs(
                     break
                 index = queue.popleft()
                 try:
-                    future = pool.there.submit(
+                    future = pool.submit(
                         _work_in_turns, with_inputs(work), jobs[index], MOST_GROWTH
                     )
                     running[future] = index
@@ -134,11 +130,11 @@ def run_jobs(
             if not running and not broken:
                 break
             if not running:
-                pool.renew()
+                pool = pool.followed()
                 continue
             done, _ = wait(running, POLL, FIRST_COMPLETED)
-            if not done and pool.there.lost_one():
-                pool.there.kill()  # and what runs there is broken at the next look
+            if not done and pool.lost_one():
+                pool.kill()  # and what runs there is broken at the next look
             dead = [future for future in done if isinstance(future.exception(), BrokenProcessPool)]
             for future in done - set(dead):
                 result, swollen = future.result()
@@ -150,7 +146,7 @@ def run_jobs(
                 dead[0].result()
             lost = sorted(running.values())  # a broken pool finishes none of them
             running.clear()
-            pool.renew()
+            pool = pool.followed()
             if alone and on_lost is not None:
                 on_lost(lost[0])
             else:
@@ -160,8 +156,7 @@ def run_jobs(
         pool.kill()
         raise
     finally:
-        if standing is None:
-            pool.end()
+        pool.shutdown(wait=True, cancel_futures=True)
 
 
 def with_inputs(work: Callable[[Job], Result]) -> Callable[[Job], Result]:
@@ -187,50 +182,6 @@ def _work_in_turns(
 
 _after_first_job: dict[str, int] = {}
 """Memory of this process when its first job was done [bytes]."""
-
-
-class PersistentPool:
-    """Processes that stay for several calls of `run_jobs`, such as the generations of a search.
-
-    To start one and import Drake takes seconds. They are started when they are needed first, anew
-    after one has died, and end with the block.
-    """
-
-    def __init__(self, workers: int | None = None) -> None:
-        """For so many processes; None: one for each processor. With one, jobs are done here."""
-        self.count = workers or default_workers()
-        self._pool: _Pool | None = None
-
-    def __enter__(self) -> Self:
-        """Nothing is started yet."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Ends the processes."""
-        self.end()
-
-    @property
-    def there(self) -> _Pool:
-        """The processes, started where they are not yet."""
-        if self._pool is None:
-            self._pool = _Pool(self.count)
-        return self._pool
-
-    def renew(self) -> None:
-        """Ends the processes and starts others."""
-        self._pool = self.there.followed()
-
-    def kill(self) -> None:
-        """Ends the processes at once, in the middle of their jobs."""
-        if self._pool is not None:
-            self._pool.kill()
-        self.end()
-
-    def end(self) -> None:
-        """Ends the processes when what they do is done; nothing where there are none."""
-        if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
-        self._pool = None
 
 
 class _Pool(ProcessPoolExecutor):

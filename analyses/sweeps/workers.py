@@ -1,19 +1,14 @@
-"""Who computes the chunks of a sweep: this process, local processes, or a Dask cluster."""
+"""Jobs on a Dask cluster."""
 
 from __future__ import annotations
 
 import queue
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
-
-import numba
-import numpy as np
+from typing import Any, TypeVar
 
 from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs, with_inputs
+from cdpr_drake.analyses.sweeps.worker_pool import with_inputs
 from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import share_compilation
@@ -21,27 +16,11 @@ from cdpr_drake.kernel_cache.locks import share_compilation
 POLL = 0.1
 """Time between looks at a request to stop [s]."""
 
-CHUNKS_AHEAD = 2
-"""Chunks handed out per thread of a cluster, so that none waits for the next."""
+JOBS_AHEAD = 2
+"""Jobs handed out per thread of a cluster, so that none waits for the next."""
 
 SCHEDULER_TIMEOUT = 5.0
 """A scheduler must answer within this time [s]."""
-
-
-class SweepTask(Protocol):
-    """What computes a part of a sweep; it is pickled to reach the workers."""
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Arrays whose first index runs over the items start to stop."""
-
-
-@dataclass(frozen=True)
-class SweepChunk:
-    """Items start to stop of one task."""
-
-    task: SweepTask
-    start: int
-    stop: int
 
 
 Job = TypeVar("Job")
@@ -49,16 +28,6 @@ Result = TypeVar("Result")
 
 Submit = Callable[[Callable[[Any], Any], Any], Any]
 """Hands out a job, with what does it, and returns a future."""
-
-
-def compute(chunk: SweepChunk) -> dict[str, np.ndarray]:
-    """Computes a chunk in this process, on one core."""
-    before = numba.get_num_threads()  # of this thread
-    numba.set_num_threads(1)
-    try:
-        return chunk.task(chunk.start, chunk.stop)
-    finally:
-        numba.set_num_threads(before)
 
 
 def do_by_same_code(work: Callable[[Job], Result], job: Job, version: str) -> Result:
@@ -75,67 +44,6 @@ def do_by_same_code(work: Callable[[Job], Result], job: Job, version: str) -> Re
     share_compilation()
     with one_blas_thread():
         return work(job)
-
-
-def computed(
-    chunks: Sequence[SweepChunk],
-    workers: int | None,
-    scheduler: str | None,
-    should_stop: Callable[[], bool],
-    standing: PersistentPool | None = None,
-) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-    """Numbers of chunks with their arrays, in the order in which they get finished.
-
-    Args:
-        chunks: What to compute.
-        workers: Number of local processes, with one this process does it; None: one for each
-            processor.
-        scheduler: Address of a Dask scheduler, whose workers compute instead.
-        should_stop: Asked often; with True no more chunks are handed out, those under way end.
-        standing: Local processes that are there already, in the place of `workers`.
-
-    Raises:
-        SweepError: The scheduler does not answer or got lost, or a local process died.
-    """
-    yield from run_jobs_somewhere(compute, chunks, workers, scheduler, should_stop, standing)
-
-
-def run_jobs_somewhere(
-    work: Callable[[Job], Result],
-    jobs: Sequence[Job],
-    workers: int | None,
-    scheduler: str | None,
-    should_stop: Callable[[], bool] | None = None,
-    standing: PersistentPool | None = None,
-) -> Iterator[tuple[int, Result]]:
-    """Does jobs in processes of this machine, see `run_jobs`, or of a cluster, see `run_jobs_on`.
-
-    Args:
-        work: A function of a module of the package.
-        jobs: Its arguments.
-        workers: Number of local processes, with one this process does it; None: one for each
-            processor.
-        scheduler: Address of a Dask scheduler, whose workers compute instead.
-        should_stop: Asked often; with True no more jobs are handed out, those under way end.
-        standing: Local processes that are there already, in the place of `workers`.
-
-    Yields:
-        Index of the job and its result, in the order in which they get finished.
-
-    Raises:
-        Exception: Whatever `work` raises.
-        SweepError: The scheduler does not answer or got lost, or a local process died.
-    """
-    if scheduler is not None:
-        yield from run_jobs_on(scheduler, work, jobs, should_stop)
-        return
-    try:
-        yield from run_jobs(work, jobs, workers, should_stop, standing=standing)
-    except BrokenProcessPool as problem:
-        raise SweepError(
-            "a worker process died (out of memory?); what was finished is kept: run again to "
-            "continue, perhaps with fewer processes"
-        ) from problem
 
 
 def run_jobs_on(
@@ -161,7 +69,7 @@ def run_jobs_on(
     """
     with _dask(scheduler) as (submit, threads):
         never: Callable[[], bool] = lambda: False  # noqa: E731
-        ahead = CHUNKS_AHEAD * threads
+        ahead = JOBS_AHEAD * threads
         yield from _hand_out(work, jobs, submit, ahead, should_stop or never)
 
 

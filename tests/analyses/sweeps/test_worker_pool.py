@@ -9,9 +9,7 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 
 from cdpr_drake.analyses.sweeps import worker_pool
-from cdpr_drake.analyses.sweeps.worker_pool import PersistentPool, run_jobs
-from cdpr_drake.analyses.sweeps.workers import run_jobs_somewhere
-from cdpr_drake.errors import SweepError
+from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
 from tests.analyses.sweeps.dying_jobs import die_for, hold, newest_dies
 
 
@@ -87,33 +85,6 @@ def test_processes_that_keep_memory_are_replaced_and_no_job_is_lost(monkeypatch,
     assert len(hosts(size // 2)) > most
 
 
-def processes(pool, jobs=8):
-    return {there for _, there in run_jobs(os.readlink, ["/proc/self"] * jobs, standing=pool)}
-
-
-def test_a_standing_pool_is_the_same_processes_every_time_and_ends_with_its_block():
-    with PersistentPool(2) as pool:
-        first = processes(pool)
-        assert 1 <= len(first | processes(pool) | processes(pool)) <= 2
-        assert str(os.getpid()) not in first
-        started = pool.there._started.processes
-        assert all(process.is_alive() for process in started)
-    assert not any(process.is_alive() for process in started)
-    with PersistentPool(1) as pool:
-        assert processes(pool) == {str(os.getpid())}
-        assert not pool._pool
-
-
-def test_a_standing_pool_lives_on_after_a_death_and_after_an_error():
-    with PersistentPool(2) as pool:
-        lost = []
-        found = dict(run_jobs(die_for, [1, -9, 3], standing=pool, on_lost=lost.append))
-        assert (found, lost) == ({0: 1, 2: 3}, [1])
-        with pytest.raises(ValueError, match=r"domain error|nonnegative"):
-            list(run_jobs(math.sqrt, [-1.0], standing=pool))
-        assert dict(run_jobs(math.sqrt, [4.0, 9.0], standing=pool)) == {0: 2.0, 1: 3.0}
-
-
 def test_no_jobs_no_results():
     assert list(run_jobs(math.sqrt, [])) == []
 
@@ -175,9 +146,3 @@ def test_a_job_given_to_a_broken_pool_is_given_again(submissions, on_lost, monke
     assert pools[0].killed
     assert pools[0].ended
     assert pools[1].ended
-
-
-def test_a_process_that_dies_is_said_by_whoever_runs_jobs():
-    jobs = run_jobs_somewhere(die_for, [1, -9, 2, 3], 2, None)
-    with pytest.raises(SweepError, match=r"a worker process died .* run again to continue"):
-        list(jobs)
