@@ -125,34 +125,14 @@ def certified_boxes(
         return certify(search.tasks, search.box, most_boxes, **journal, **how)
 
 
-@dataclass(frozen=True, eq=False)
-class RefinedBoxes:
-    """All boxes, after those in a tube about a way were cut further.
-
-    `judged` boxes were judged for it; the open share of those that meet the tube fell from `before`
-    to `after`.
-    """
-
-    boxes: CertifiedBoxes
-    tube: PathTube
-    before: float
-    after: float
-    judged: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "way_m": self.tube.poses[:, :3].tolist(), "reach_m": float(self.tube.reach[0]),
-            "boxes_judged": self.judged, "open_share_before": self.before,
-            "open_share_after": self.after,
-        }  # fmt: skip
-
-
 def refined_boxes(
     boxes: CertifiedBoxes, search: BoxSearch, way: Array, reach: float, most_boxes: int,
     folder: Folder | None = None, **how: Any,
-) -> RefinedBoxes:  # fmt: skip
+) -> tuple[CertifiedBoxes, dict[str, Any]]:  # fmt: skip
     """Open boxes cut further about a way of Po, at all orientations of the search.
+
+    All boxes, and for JSON how many were judged for it, and which shares of those within reach of
+    the way were open before and are open now.
 
     Args:
         boxes: Boxes of the whole region.
@@ -180,8 +160,11 @@ def refined_boxes(
     arguments = search.arguments() | plain({"tube": tube, "boxes": int(boxes.curve[-1, 0])})
     with _journal(folder, REFINED_JOURNAL, search, arguments) as journal:
         finer = refine(boxes, search.tasks, tube, most_boxes, **journal, **how)
-    judged = int(finer.curve[-1, 0] - boxes.curve[-1, 0])
-    return RefinedBoxes(finer, tube, _open_share(boxes, tube), _open_share(finer, tube), judged)
+    return finer, {
+        "way_m": way.tolist(), "reach_m": float(reach),
+        "boxes_judged": int(finer.curve[-1, 0] - boxes.curve[-1, 0]),
+        "open_share_before": _open_share(boxes, tube), "open_share_after": _open_share(finer, tube),
+    }  # fmt: skip
 
 
 def _open_share(boxes: CertifiedBoxes, tube: PathTube) -> float:

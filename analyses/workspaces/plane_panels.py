@@ -32,15 +32,8 @@ CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 
 
 class Panels(NamedTuple):
-    """A figure with a panel for each plane of a grid that is shown.
-
-    Attributes:
-        figure: The figure.
-        axes: Axes of each plane.
-        chosen: Number of each plane along `normal`.
-        normal: Axis normal to the planes.
-        handles: What of the robot is drawn, for the legend.
-    """
+    """A figure with axes for each of the chosen planes along the normal axis, and what of the robot
+    is drawn there, for the legend."""
 
     figure: Figure
     axes: list[Axes]
@@ -56,7 +49,8 @@ shape (nx, ny, nz), shape (nv, nu)."""
 
 def draw_regions(
     grid: WorkspaceGrid, title: str, parts: Array, colors: Mapping[str, str | None],
-    robot: Robot | None, *, most: int, borders: bool = False, columns: int = 3,
+    robot: Robot | None, *, most: int, borders: bool = False,
+    columns: tuple[int, int] = (3, 3),
 ) -> Figure:  # fmt: skip
     """Planes of a grid, coloured by what holds at their points.
 
@@ -65,10 +59,10 @@ def draw_regions(
         title: Title of the figure.
         parts: Number of the colour of each point, shape (nx, ny, nz).
         colors: Colours, with their labels; no label: it does not occur.
-        robot: As `draw_planes`.
-        most: As `draw_planes`.
+        robot: As `draw_planes`, like most.
+        most: Largest number of planes.
         borders: True: cells have borders, unless they are small.
-        columns: Columns of the legend.
+        columns: Columns of the legend below up to two panels, and below more.
     """
     table = ListedColormap(list(colors))
 
@@ -84,7 +78,7 @@ def draw_regions(
     patches = [Patch(facecolor=color, label=label) for color, label in colors.items() if label]
     panels.figure.legend(
         handles=[*patches, *panels.handles], loc="outside lower center", title_fontsize=10,
-        ncols=columns if len(panels.axes) > 2 else 2,
+        ncols=columns[len(panels.axes) > 2],
         title="Each point of the grid colours the cell around it.",
     )  # fmt: skip
     return panels.figure
@@ -155,11 +149,8 @@ def draw_planes(
 
 
 def plane_axes(counts: Sequence[int]) -> tuple[int, int, int]:
-    """Numbers of the axis normal to the planes that show most, and of their axes.
-
-    Args:
-        counts: Points along x, y, z.
-    """
+    """Numbers of the axis normal to the planes that show most, and of their axes, for so many
+    points along x, y, z."""
     nx, ny, nz = counts
     if nz > 1 and ny == 1:
         return 1, 0, 2
@@ -177,12 +168,8 @@ def even_choice(count: int, most: int) -> list[int]:
 def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
     """Borders of the cells around the points of some axes, shape (n + 1,) each [m].
 
-    Cells end at the grid's box, beyond which nothing was asked: the first and the last of an axis
-    are half as wide as the others. The cell of a one-point axis is as large as those of the others.
-
-    Args:
-        axes: Coordinates along x, y, z, ascending and evenly spaced, shape (n,) [m].
-        which: Numbers of the axes.
+    Cells end at the grid's box: the first and the last of an axis are half as wide as the others.
+    The cell of a one-point axis is as large as the cells of the others.
     """
     steps = [float(np.ptp(axes[k])) / max(len(axes[k]) - 1, 1) for k in which]
     widest = max(steps) or ONE_CELL

@@ -58,7 +58,7 @@ def planes_figure(stability: Stability, bounds: str | None = None) -> Figure:
     colors = {color: LABELS[key] for key, color in COLORS.items()}
     return draw_regions(
         stability.grid, _title(stability, words, bounds), parts, colors, stability.robot,
-        most=MOST_PLANES, borders=True, columns=4,
+        most=MOST_PLANES, borders=True, columns=(2, 4),
     )  # fmt: skip
 
 

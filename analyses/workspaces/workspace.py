@@ -267,10 +267,9 @@ def compute_workspace(
             if refine is not None and proven.finished:
                 how["on_progress"] = _counting(follow, refine_boxes)
                 way = np.asarray(refine, float)
-                finer = refined_boxes(
+                proven, finer = refined_boxes(
                     proven, search, way, refine_reach, refine_boxes, results, **how
                 )
-                proven = finer.boxes
             result = replace(result, boxes=proven, refined=finer, stopped=not proven.finished)
         if mesh is not None and cast is not None:
             with whole_file(Path(mesh)) as part:

@@ -17,7 +17,6 @@ from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.workspaces.box_certificates import (
     BoxSearch,
-    RefinedBoxes,
     agreement_numbers,
     box_numbers,
     save_boxes,
@@ -81,7 +80,7 @@ class Workspace(GridResult):
         boxes: Boxes proven inside or outside.
         search: What was cut into boxes.
         region: Lower and upper corner of the box given instead of the frame, shape (3,) each [m].
-        refined: How boxes were cut further along a way.
+        refined: How boxes were cut further along a way, as `refined_boxes` says.
     """
 
     holds: dict[str, np.ndarray]
@@ -91,7 +90,7 @@ class Workspace(GridResult):
     boxes: CertifiedBoxes | None = None
     search: BoxSearch | None = None
     region: tuple[Array, Array] | None = None
-    refined: RefinedBoxes | None = None
+    refined: dict[str, Any] | None = None
 
     @property
     def exit_code(self) -> int:
@@ -161,7 +160,7 @@ class Workspace(GridResult):
         if self.boxes is not None and self.search is not None:
             result["certified"] = box_numbers(self.boxes, self.search)
             if self.refined is not None:
-                result["refined"] = self.refined.as_dict()
+                result["refined"] = self.refined
             result["agreement"] = {
                 name: agreement_numbers(part) for name, part in self.agreement.items()
             }
@@ -269,8 +268,9 @@ class Workspace(GridResult):
         ]
         if (finer := self.refined) is not None:
             lines.append(
-                f"boxes within {finer.tube.reach[0]:g} m of the way: {finer.before:.2%} of them "
-                f"were open, {finer.after:.2%} are; {finer.judged} boxes"
+                f"boxes within {finer['reach_m']:g} m of the way: "
+                f"{finer['open_share_before']:.2%} of them were open, "
+                f"{finer['open_share_after']:.2%} are; {finer['boxes_judged']} boxes"
             )
         return lines + [
             f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at {part.poses} of "

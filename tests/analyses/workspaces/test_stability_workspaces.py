@@ -164,19 +164,11 @@ def test_the_target_may_be_a_real_one():
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"limits": (-1.0, 60.0)}, ["-1", "0 <= lower"]),
-        ({"mass": -1.0}, ["weight"]),
-        ({"wrench": np.zeros(5)}, ["wrench", "6"]),
-    ],
+    ("changes", "words"), [({"mass": -1.0}, "weight"), ({"wrench": np.zeros(5)}, "wrench: .*6")]
 )
 def test_refuses_loads_that_make_no_sense(changes, words):
-    with pytest.raises(CdprError) as refused:
+    with pytest.raises(CdprError, match=words):
         static_case(load_robot("acrobot_large"), **changes)
-    for word in words:
-        assert word in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_too_few_cables_are_refused(tmp_path):
