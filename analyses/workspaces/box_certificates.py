@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +30,9 @@ from cdpr_drake.workspaces.mesh_files import write_cells
 BOX_ARRAYS, JOURNAL, REFINED_JOURNAL = "boxes.npz", "boxes_journal.npz", "refined_journal.npz"
 """Files of the boxes, and of what a search, or one along a way, that is continued begins with."""
 
+NAMES = ("poses", "halves", "verdicts", "curve")
+"""Arrays of the boxes."""
+
 SAVE_SECONDS = 5.0
 """Between two times that the journal is written."""
 
@@ -39,36 +42,14 @@ NAMED = 5
 
 @dataclass(frozen=True, eq=False)
 class BoxSearch:
-    """What is to be proven, and where.
-
-    Attributes:
-        tasks: What is to be proven, of one kind each.
-        box: The poses.
-    """
+    """What is to be proven, a task a kind, of which poses."""
 
     tasks: tuple[CertifyTask, ...]
     box: PoseBox
 
-    @property
-    def task(self) -> CertifyTask:
-        """What is to be proven; of several the first."""
-        return self.tasks[0]
-
-    def words(self) -> dict[str, Any]:
-        """Of which cables and which poses verdicts are, for JSON."""
-        task = self.task
-        cables = task.case.cables
-        if task.kind in MEETING and task.around is not None:
-            cables = task.around.cables
-        return {
-            "cables": "over pulleys" if cables.has_pulleys() else "from fixed exit points",
-            "lower_m_rad": self.box.lower.tolist(),
-            "upper_m_rad": self.box.upper.tolist(),
-        }
-
     def arguments(self) -> dict[str, Any]:
         """All that verdicts depend on, for JSON."""
-        tasks = self.task if len(self.tasks) == 1 else self.tasks
+        tasks = self.tasks[0] if len(self.tasks) == 1 else self.tasks
         arguments = {"cdpr_drake": code_version(), "task": tasks, "box": self.box}
         result: dict[str, Any] = plain(arguments)
         return result
@@ -109,30 +90,24 @@ def box_search(
             f"certify: found method {about.method}; accepted: no method, for it is proven that "
             "there are tensions, not that a method finds them"
         )
-    tasks = tuple(
+    required = about.required or SpatialSet()
+    tasks = [
         CertifyTask(
-            CertifiedKind(kind), about.case, about.required or SpatialSet(), about.around,
-            about.clearance, *errors,
+            CertifiedKind(kind), about.case, required, about.around, about.clearance, *errors
         )
         for kind in kinds
-    )  # fmt: skip
+    ]
     lower, upper = robot.reach()
     if region is not None:
         free = lower < upper
         lower, upper = np.where(free, region[0], lower), np.where(free, region[1], upper)
-    box = PoseBox(
-        np.concatenate([lower, angles.min(axis=0)]), np.concatenate([upper, angles.max(axis=0)])
-    )
-    return BoxSearch(tasks, box)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    box = PoseBox(np.concatenate([lower, low]), np.concatenate([upper, high]))
+    return BoxSearch(tuple(tasks), box)
 
 
 def certified_boxes(
-    search: BoxSearch,
-    most_boxes: int = 200_000,
-    folder: Folder | None = None,
-    *,
-    on_progress: Callable[[int, float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    search: BoxSearch, most_boxes: int = 200_000, folder: Folder | None = None, **how: Any
 ) -> CertifiedBoxes:
     """Boxes proven inside or outside; with a folder it goes on where it was stopped or killed.
 
@@ -140,61 +115,24 @@ def certified_boxes(
         search: What is to be proven, and where.
         most_boxes: How many boxes are judged, at most; more of them continue a search for fewer.
         folder: Where `JOURNAL` is kept; None: nowhere.
-        on_progress: As `workspaces.certify`.
-        should_stop: As `workspaces.certify`.
+        how: `on_progress` and `should_stop` of `workspaces.certify`.
 
     Raises:
         WorkspaceError: most_boxes < 1.
         OutputFolderError: The folder cannot be written.
     """
-    with _journal(folder, JOURNAL, search, search.arguments()) as (earlier, keep):
-        return certify(
-            search.tasks, search.box, most_boxes, on_progress=on_progress,
-            should_stop=should_stop, known=earlier, on_journal=keep,
-        )  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class RefinedBoxes:
-    """Boxes that were cut further along a way.
-
-    Attributes:
-        boxes: All boxes, of the whole.
-        tube: Where they were cut further.
-        before: Open share of the boxes that had a pose in common with it.
-        after: Of those that have one in common now.
-        judged: How many boxes were judged for it.
-    """
-
-    boxes: CertifiedBoxes
-    tube: PathTube
-    before: float
-    after: float
-    judged: int
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "way_m": self.tube.poses[:, :3].tolist(),
-            "reach_m": float(self.tube.reach[0]),
-            "boxes_judged": self.judged,
-            "open_share_before": self.before,
-            "open_share_after": self.after,
-        }
+    with _journal(folder, JOURNAL, search, search.arguments()) as journal:
+        return certify(search.tasks, search.box, most_boxes, **journal, **how)
 
 
 def refined_boxes(
-    boxes: CertifiedBoxes,
-    search: BoxSearch,
-    way: Array,
-    reach: float,
-    most_boxes: int,
-    folder: Folder | None = None,
-    *,
-    on_progress: Callable[[int, float], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
-) -> RefinedBoxes:
+    boxes: CertifiedBoxes, search: BoxSearch, way: Array, reach: float, most_boxes: int,
+    folder: Folder | None = None, **how: Any,
+) -> tuple[CertifiedBoxes, dict[str, Any]]:  # fmt: skip
     """Open boxes cut further about a way of Po, at all orientations of the search.
+
+    All boxes, and for JSON how many were judged for it, and which shares of those within reach of
+    the way were open before and are open now.
 
     Args:
         boxes: Boxes of the whole region.
@@ -203,32 +141,30 @@ def refined_boxes(
         reach: How far Po may be off it along each axis [m].
         most_boxes: How many more boxes are judged, at most.
         folder: Where `REFINED_JOURNAL` is kept; None: nowhere.
-        on_progress: As `workspaces.refine`.
-        should_stop: As `workspaces.refine`.
+        how: `on_progress` and `should_stop` of `workspaces.refine`.
 
     Raises:
         WorkspaceError: A number is not accepted, or the way meets no box.
         OutputFolderError: The folder cannot be written.
     """
-    middle = 0.5 * (search.box.lower + search.box.upper)[3:]
-    turns = 0.5 * (search.box.upper - search.box.lower)[3:]
+    low, high = search.box.lower, search.box.upper
+    turns = np.broadcast_to(0.5 * (low + high)[3:], (len(way), 3))
     tube = PathTube(
-        np.hstack([way, np.repeat(middle[np.newaxis], len(way), axis=0)]),
-        np.concatenate([np.full(3, reach), turns]),
+        np.hstack([way, turns]), np.concatenate([np.full(3, reach), 0.5 * (high - low)[3:]])
     )
     if not np.any(tube.meets(boxes.poses, boxes.halves)):
         raise WorkspaceError(
             f"refine: found a way that is nowhere within {reach:g} m of the boxes; accepted: one "
-            f"in x, y, z from {search.box.lower[:3]} to {search.box.upper[:3]} m"
+            f"in x, y, z from {low[:3]} to {high[:3]} m"
         )
     arguments = search.arguments() | plain({"tube": tube, "boxes": int(boxes.curve[-1, 0])})
-    with _journal(folder, REFINED_JOURNAL, search, arguments) as (earlier, keep):
-        finer = refine(
-            boxes, search.tasks, tube, most_boxes, on_progress=on_progress,
-            should_stop=should_stop, known=earlier, on_journal=keep,
-        )  # fmt: skip
-    judged = int(finer.curve[-1, 0] - boxes.curve[-1, 0])
-    return RefinedBoxes(finer, tube, _open_share(boxes, tube), _open_share(finer, tube), judged)
+    with _journal(folder, REFINED_JOURNAL, search, arguments) as journal:
+        finer = refine(boxes, search.tasks, tube, most_boxes, **journal, **how)
+    return finer, {
+        "way_m": way.tolist(), "reach_m": float(reach),
+        "boxes_judged": int(finer.curve[-1, 0] - boxes.curve[-1, 0]),
+        "open_share_before": _open_share(boxes, tube), "open_share_after": _open_share(finer, tube),
+    }  # fmt: skip
 
 
 def _open_share(boxes: CertifiedBoxes, tube: PathTube) -> float:
@@ -240,7 +176,7 @@ def _open_share(boxes: CertifiedBoxes, tube: PathTube) -> float:
 @contextmanager
 def _journal(
     folder: Folder | None, name: str, search: BoxSearch, arguments: Mapping[str, Any]
-) -> Iterator[tuple[BoxJournal | None, Callable[[BoxJournal], None]]]:
+) -> Iterator[dict[str, Any]]:
     """What an earlier search of the same had judged, and what keeps a journal now and then."""
     words = json.dumps(arguments, sort_keys=True)
     earlier, last, saved = None, None, time.monotonic()
@@ -262,14 +198,19 @@ def _journal(
             save()
             saved = time.monotonic()
 
-    yield earlier, keep
+    yield {"known": earlier, "on_journal": keep}
     save()
 
 
 def box_numbers(boxes: CertifiedBoxes, search: BoxSearch) -> dict[str, Any]:
     """What was cut into boxes, shares and the curve for JSON."""
+    task = search.tasks[0]
+    cables = task.case.cables
+    if task.kind in MEETING and task.around is not None:
+        cables = task.around.cables
     return {
-        **search.words(),
+        "cables": "over pulleys" if cables.has_pulleys() else "from fixed exit points",
+        "lower_m_rad": search.box.lower.tolist(), "upper_m_rad": search.box.upper.tolist(),
         "boxes_judged": int(boxes.curve[-1, 0]), "inside_share": boxes.inside,
         "outside_share": boxes.outside, "open_share": boxes.open, "finished": boxes.finished,
         "curve": [
@@ -280,35 +221,27 @@ def box_numbers(boxes: CertifiedBoxes, search: BoxSearch) -> dict[str, Any]:
 
 
 def save_boxes(boxes: CertifiedBoxes, folder: Folder) -> None:
-    """Writes `BOX_ARRAYS`.
-
-    Of several kinds the bits that say which are proven of each box are there, too, so that boxes
-    that are read again can be refined.
-    """
-    arrays = {name: getattr(boxes, name) for name in ("poses", "halves", "verdicts", "curve")}
+    """Writes `BOX_ARRAYS`; of several kinds also which are proven of each box, for `refine`."""
+    arrays = {name: getattr(boxes, name) for name in NAMES}
     if boxes.proven is not None:
         arrays["proven"] = boxes.proven
     folder.write_arrays(BOX_ARRAYS, arrays)
 
 
 def load_boxes(folder: Path, finished: bool) -> CertifiedBoxes:
-    """Reads what `save_boxes` wrote.
-
-    Args:
-        folder: Its folder.
-        finished: What `box_numbers` says of that.
+    """Reads what `save_boxes` wrote; `finished` is what `box_numbers` says of that.
 
     Raises:
         DataFileError: There is no such file, or it is damaged.
     """
-    arrays, names = load_arrays(folder / BOX_ARRAYS), ("poses", "halves", "verdicts", "curve")
-    if arrays is None or not set(names) <= set(arrays):
+    arrays = load_arrays(folder / BOX_ARRAYS)
+    if arrays is None or not set(NAMES) <= set(arrays):
         raise DataFileError(f"{folder / BOX_ARRAYS}: found no boxes; accepted: a whole file")
-    poses, halves, verdicts, curve = (arrays[name] for name in names)
+    poses, halves, verdicts, curve = (arrays[name] for name in NAMES)
     return CertifiedBoxes(poses, halves, verdicts, curve, finished, arrays.get("proven"))
 
 
-def write_boxes(boxes: CertifiedBoxes, path: Path) -> Path:
+def write_boxes(boxes: CertifiedBoxes, path: Path) -> None:
     """Writes the positions of the boxes as cells of VTK, with verdict and half angles.
 
     Raises:
@@ -319,19 +252,15 @@ def write_boxes(boxes: CertifiedBoxes, path: Path) -> Path:
     if np.any(boxes.halves[:, 3:]):
         for k, name in enumerate(("phi", "theta", "psi"), 3):
             numbers[name], numbers[f"half_{name}"] = boxes.poses[:, k], boxes.halves[:, k]
-    return write_cells(path, boxes.poses[:, :3], boxes.halves[:, :3], numbers)
+    write_cells(path, boxes.poses[:, :3], boxes.halves[:, :3], numbers)
 
 
-def agreement_numbers(agreement: Mapping[str, BoxAgreement]) -> dict[str, Any]:
+def agreement_numbers(agreement: BoxAgreement) -> dict[str, Any]:
     """Counts, and the first poses at which boxes are wrong, for JSON."""
     return {
-        name: {
-            "poses": part.poses,
-            "in_boxes_proven_inside": part.inside,
-            "in_boxes_proven_outside": part.outside,
-            "in_open_boxes_or_none": part.poses - part.inside - part.outside,
-            "contradictions": len(part.broken),
-            "first_contradictions_m_rad": part.broken[:NAMED].tolist(),
-        }
-        for name, part in agreement.items()
-    }
+        "poses": agreement.poses, "in_boxes_proven_inside": agreement.inside,
+        "in_boxes_proven_outside": agreement.outside,
+        "in_open_boxes_or_none": agreement.poses - agreement.inside - agreement.outside,
+        "contradictions": len(agreement.broken),
+        "first_contradictions_m_rad": agreement.broken[:NAMED].tolist(),
+    }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,14 +63,7 @@ SECTIONS = ("cables", "winches", "damping", "torque_control", "integration")
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """A target and the camera on the platform that shall see it.
-
-    Attributes:
-        target: The target.
-        X_WO: Where it is.
-        X_PC: Camera on the platform.
-        pinhole: Its intrinsic parameters.
-    """
+    """A target at X_WO, and the camera on the platform, with its intrinsics, that shall see it."""
 
     target: Target
     X_WO: RigidTransform
@@ -80,58 +73,40 @@ class CameraView:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedBreaks:
-    """All single breaks of a cable at the poses of a grid, with every reaction.
-
-    Attributes:
-        robot: The robot.
-        request: Reactions, velocity and scenario of the breaks.
-        grid: The poses.
-    """
+    """All single breaks of a cable at the poses of a grid, with every reaction of a request."""
 
     robot: Robot
     request: BreakRequest
     grid: WorkspaceGrid
-    _last: dict[tuple[int, int], dict[str, np.ndarray]] = field(default_factory=dict)
 
     def arguments(self) -> dict[str, Any]:
         """What its numbers depend on, for JSON."""
         request = self.request
         return {
-            "scenario": request.scenario.name,
-            "reactions": list(request.reactions),
-            "moving_m_s": plain(np.asarray(request.velocity, float)),
-            "after_s": request.after,
+            "scenario": request.scenario.name, "reactions": list(request.reactions),
+            "moving_m_s": plain(np.asarray(request.velocity, float)), "after_s": request.after,
             "limits_n": None if request.limits is None else list(request.limits),
             "cable_names": [cable.name for cable in self.robot.cables],
             **{name: plain(getattr(request.scenario, name)) for name in SECTIONS},
-        }
+        }  # fmt: skip
 
     def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
         """Arrays of the poses start to stop, shape (n,).
 
         `SURVIVES`; `EXCURSION`, how far the best reaction to the worst break goes [m]; `WORST`,
         number of that cable, from 1; `BEST`, number of that reaction in the request, from 1.
-        The last three are NaN where all cables do not hold the pose. The arrays of the last poses
-        are kept, since the kind and each measure read them.
+        The last three are NaN where all cables do not hold the pose.
         """
-        if (start, stop) not in self._last:
-            rows = [self._at(number) for number in range(start, stop)]
-            table = np.array(rows, float).reshape(stop - start, 4)
-            self._last.clear()
-            self._last[start, stop] = {
-                SURVIVES: table[:, 0] > 0.0, EXCURSION: table[:, 1], WORST: table[:, 2],
-                BEST: table[:, 3],
-            }  # fmt: skip
-        return self._last[start, stop]
-
-    def _at(self, number: int) -> tuple[float, float, float, float]:
         from cdpr_drake.analyses.simulation.break_survival import breaks_at  # few need it
 
-        outcomes = breaks_at(self.robot, self.grid.poses(number, number + 1)[0], self.request)
-        if outcomes is None:
-            return 0.0, np.nan, np.nan, np.nan
-        cable, reaction, excursion, saved = outcomes.worst()
-        return float(saved), excursion, cable + 1.0, reaction + 1.0
+        table = np.full((stop - start, 3), np.nan)
+        survives = np.zeros(stop - start, bool)
+        for k, X_WP in enumerate(self.grid.poses(start, stop)):
+            outcomes = breaks_at(self.robot, X_WP, self.request)
+            if outcomes is not None:
+                cable, reaction, excursion, survives[k] = outcomes.worst()
+                table[k] = excursion, cable + 1.0, reaction + 1.0
+        return {SURVIVES: survives, **dict(zip(OF_BREAKS, table.T, strict=True))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +119,12 @@ class PoseConditions:
         gravity: Acceleration along `case.down` [m/s^2].
         body: Mass [kg], centre of mass in P [m], rotational inertia about Po in P [kg m^2].
         clearance: How far cables, and the platform, must stay from what they may meet [m].
-        required: Wrenches to resist beside the weight; None: none were given.
-        motion: Accelerations and velocities; None: none were given.
-        view: What the camera shall see; None: none was given.
-        stable: The criterion of stability at the poses of the grid; None: it is not needed.
+        required: Wrenches to resist beside the weight.
+        motion: Accelerations and velocities.
+        view: What the camera shall see.
+        stable: The criterion of stability at the poses of the grid.
         method: Name of the method of tensions for the kind `static`; None: any tensions.
-        breaks: Single breaks simulated at the poses of the grid; None: they are not needed.
+        breaks: Single breaks simulated at the poses of the grid.
     """
 
     case: StaticCase
@@ -177,12 +152,9 @@ class Poses:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of workspace.
+    """A kind of workspace: what holds, and if it does at some poses, shape (n,).
 
-    Attributes:
-        title: What holds there.
-        holds: Whether it does, shape (n,), at some poses.
-        needs: Field of `PoseConditions` that must be given; empty: none.
+    `needs` is the field of `PoseConditions` without which nobody can say.
     """
 
     title: str
@@ -192,7 +164,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Measure:
-    """A number per pose; NaN where it makes no sense."""
+    """A number per pose, shape (n,); NaN where it makes no sense."""
 
     title: str
     unit: str
@@ -209,10 +181,6 @@ def _wrench_feasible(about: PoseConditions, at: Poses) -> np.ndarray:
     assert about.required is not None
     demand = resisting(about.case, about.required, at.rotations)
     return capacity_margins(about.case, at.positions, at.rotations, demand).feasible
-
-
-def _single_failure(about: PoseConditions, at: Poses) -> np.ndarray:
-    return survives_breaks(about.case, at.positions, at.rotations, about.required)
 
 
 def _dynamic(about: PoseConditions, at: Poses) -> np.ndarray:
@@ -241,9 +209,22 @@ def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
     return about.stable(at.start, at.stop)["stable"]
 
 
-def _of_breaks(about: PoseConditions, at: Poses, name: str) -> np.ndarray:
-    assert about.breaks is not None
-    return about.breaks(at.start, at.stop)[name]
+def _of_breaks(name: str) -> Callable[[PoseConditions, Poses], np.ndarray]:
+    def of_breaks(about: PoseConditions, at: Poses) -> np.ndarray:
+        assert about.breaks is not None
+        return about.breaks(at.start, at.stop)[name]
+
+    return of_breaks
+
+
+def _at(function: Callable[..., Any]) -> Callable[[PoseConditions, Poses], Any]:
+    """A number that depends on the platform and its load only."""
+    return lambda about, at: function(about.case, at.positions, at.rotations)
+
+
+def _with_breaks(function: Callable[..., Any]) -> Callable[[PoseConditions, Poses], Any]:
+    """A number after any one cable broke, of the load and the required wrenches."""
+    return lambda about, at: function(about.case, at.positions, at.rotations, about.required)
 
 
 KINDS: dict[str, Kind] = {
@@ -252,18 +233,18 @@ KINDS: dict[str, Kind] = {
     "dynamic": Kind("every acceleration can be had", _dynamic, "motion"),
     "wrench-closure": Kind(
         "tensions without upper limit balance every wrench",
-        lambda about, at: closure_margins(about.case, at.positions, at.rotations) > 0.0,
+        _at(lambda *poses: closure_margins(*poses) > 0.0),
     ),
     "single-failure": Kind(
-        "weight and required wrenches can be held with any one cable broken", _single_failure
+        "weight and required wrenches can be held with any one cable broken",
+        _with_breaks(survives_breaks),
     ),
     "statically-stable": Kind(
         "held with a regular Jacobian and a positive definite stiffness",
-        lambda about, at: stiffness_at(about.case, at.positions, at.rotations).stable,
+        _at(lambda *poses: stiffness_at(*poses).stable),
     ),
     "singularity-free": Kind(
-        f"the dexterity is above {REGULAR:g}",
-        lambda about, at: dexterities(about.case, at.positions, at.rotations) > REGULAR,
+        f"the dexterity is above {REGULAR:g}", _at(lambda *poses: dexterities(*poses) > REGULAR)
     ),
     "interference-free": Kind(
         "cables touch neither each other nor platform, frame or obstacles",
@@ -276,11 +257,10 @@ KINDS: dict[str, Kind] = {
     "target-visible": Kind("the camera sees the target", _visible, "view"),
     SURVIVES: Kind(
         "whichever cable breaks, a reaction keeps the platform in the frame and ends at rest",
-        lambda about, at: _of_breaks(about, at, SURVIVES),
-        "breaks",
+        _of_breaks(SURVIVES), "breaks",
     ),
     "stable": Kind("the visual servo is stable (Z of cdpr stability)", _stable, "stable"),
-}
+}  # fmt: skip
 """Kinds of workspaces by name. Source: Gazebo thesis 2.6; servoing thesis 1.2.2, (1.25), (3.27)."""
 
 OF_POSES = tuple(name for name in KINDS if name != SURVIVES)
@@ -297,50 +277,35 @@ def _frequency(about: PoseConditions, at: Poses) -> Array:
     return first_frequencies(stiffness, about.case, about.body, at.rotations)
 
 
-def _clearance(about: PoseConditions, at: Poses) -> Array:
-    return np.asarray(np.min(clearances(about.around, at.positions, at.rotations), axis=1))
-
-
 MEASURES: dict[str, Measure] = {
     "capacity-margin": Measure("capacity margin", "N", _capacity),
     "breaks-survived": Measure(
-        "single breaks after which all is held",
-        "-",
-        lambda a, at: breaks_survived(a.case, at.positions, at.rotations, a.required).astype(float),
+        "single breaks after which all is held", "-",
+        _with_breaks(lambda *poses: breaks_survived(*poses).astype(float)),
     ),
     "failure-margin": Measure(
-        "least capacity margin with any one cable broken",
-        "N",
-        lambda a, at: break_margins(a.case, at.positions, at.rotations, a.required),
+        "least capacity margin with any one cable broken", "N", _with_breaks(break_margins)
     ),
     EXCURSION: Measure(
-        "largest excursion by the best reaction to the worst break",
-        "m",
-        lambda about, at: _of_breaks(about, at, EXCURSION),
+        "largest excursion by the best reaction to the worst break", "m", _of_breaks(EXCURSION)
     ),
-    WORST: Measure(
-        "cable whose break is worst", "number", lambda about, at: _of_breaks(about, at, WORST)
-    ),
-    BEST: Measure("best reaction to that", "number", lambda about, at: _of_breaks(about, at, BEST)),
-    "tension-factor": Measure(
-        "tension factor", "-", lambda a, at: tension_factors(a.case, at.positions, at.rotations)
-    ),
+    WORST: Measure("cable whose break is worst", "number", _of_breaks(WORST)),
+    BEST: Measure("best reaction to that", "number", _of_breaks(BEST)),
+    "tension-factor": Measure("tension factor", "-", _at(tension_factors)),
     "payload": Measure(
-        "largest payload",
-        "kg",
-        lambda a, at: largest_payloads(a.case, at.positions, at.rotations, a.gravity),
+        "largest payload", "kg",
+        lambda about, at: largest_payloads(about.case, at.positions, at.rotations, about.gravity),
     ),
     "stiffness": Measure(
-        "smallest stiffness",
-        "N/m",
-        lambda a, at: stiffness_at(a.case, at.positions, at.rotations).smallest,
+        "smallest stiffness", "N/m", _at(lambda *poses: stiffness_at(*poses).smallest)
     ),
     "frequency": Measure("first natural frequency", "Hz", _frequency),
-    "dexterity": Measure(
-        "dexterity", "-", lambda a, at: dexterities(a.case, at.positions, at.rotations)
+    "dexterity": Measure("dexterity", "-", _at(dexterities)),
+    "clearance": Measure(
+        "clearance", "m",
+        lambda about, at: np.min(clearances(about.around, at.positions, at.rotations), axis=1),
     ),
-    "clearance": Measure("clearance", "m", _clearance),
-}
+}  # fmt: skip
 """Measures of a pose by name."""
 
 
@@ -349,7 +314,8 @@ def conditions_at(
 ) -> dict[str, np.ndarray]:
     """Kinds and measures at the poses start to stop of a grid, by name, shape (n,)."""
     at = Poses(start, stop, grid.positions(start, stop), grid.rotations(start, stop))
-    return {
+    broken = {} if about.breaks is None else about.breaks(start, stop)  # once for all of them
+    return broken | {
         name: KINDS[name].holds(about, at) if name in KINDS else MEASURES[name].value(about, at)
-        for name in names
-    }
+        for name in names if name not in broken
+    }  # fmt: skip

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-import zipfile
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,12 +16,13 @@ from typing import Any, Self
 import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
-from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
+from cdpr_drake.analyses.frame.follow import Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.result import STOPPED, Result
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.visualization.figure_files import figure_writers
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DataFileError, StoppedError, SweepError
 from cdpr_drake.models.robot_schema import Robot
@@ -31,23 +31,17 @@ from cdpr_drake.summaries import numbers
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, workspace_volume
 
-ARRAYS = "workspace.npz"
-"""All arrays of a result, with what they were computed for as JSON in the array `about`."""
-
-RESULTS = "results.json"
-"""File of the numbers of a result."""
+ARRAYS, RESULTS = "workspace.npz", "results.json"
+"""Files of the arrays, and of the numbers."""
 
 CHUNKS = "chunks"
 """Folder of finished chunks, until `ARRAYS` is written."""
 
-ITEMS = "poses"
+POSES = "poses"
 """Word for what is counted."""
 
 PoseArrays = Callable[[int, int], Mapping[str, np.ndarray]]
-"""Arrays by name, shape (n,), of the poses start to stop of a grid."""
-
-Chunk = tuple[str, int, int]
-"""Name of one of several `PoseArrays`, start and stop."""
+"""Arrays by name, whose first index counts the poses start to stop of a grid."""
 
 
 @contextmanager
@@ -57,12 +51,7 @@ def grid_folder(
 ) -> Iterator[Folder | None]:  # fmt: skip
     """The results folder of a grid; None if nothing is kept.
 
-    Args:
-        folder: Its path; None: one below `follow.results` that the same arguments give again.
-        arguments: All that the arrays depend on.
-        name: How an unnamed folder begins.
-        overwrite: True to replace other results.
-        follow: Who follows.
+    Without a path it is one below `follow.results`, which the same arguments give again.
     """
     if folder is None and follow.results is not None:
         digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()
@@ -75,68 +64,57 @@ def grid_folder(
 
 
 def run_grid(
-    parts: Mapping[str, PoseArrays], count: int, chunk: int, folder: Folder | None,
-    workers: int | str | None, follow: Follow,
-) -> dict[str, dict[str, np.ndarray]]:  # fmt: skip
-    """Arrays over all poses of a grid, for each of some parts.
-
-    Numbers depend on the pose only, not on chunks and workers.
+    work: PoseArrays, count: int, chunk: int, folder: Folder | None, workers: int | str | None,
+    follow: Follow,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Arrays over all poses of a grid; their numbers depend neither on chunks nor on workers.
 
     Args:
-        parts: By name, good as a file's name.
+        work: Computes the arrays of some poses; it pickles.
         count: Number of poses.
         chunk: Poses of a chunk: seconds of work at most.
-        folder: Where finished chunks are kept and found; None: nowhere.
+        folder: Where finished chunks are kept and read again; None: nowhere.
         workers: As `finished_jobs`.
         follow: Who follows.
 
     Raises:
         StoppedError: It was stopped; finished chunks are kept.
-        CdprError: As the parts.
+        CdprError: As the work.
         SweepError: The cluster cannot be used, or a process died.
     """
-    chunks: dict[Chunk, dict[str, np.ndarray]] = {}
-    jobs: list[Chunk] = []
-    for name in parts:
-        for start in range(0, count, chunk):
-            job = name, start, min(start + chunk, count)
-            arrays = None if folder is None else load_arrays(folder.path / _file(job))
-            if arrays is None:
-                jobs.append(job)
-            else:
-                chunks[job] = arrays
-    finished = sum(stop - start for _, start, stop in chunks)
-    total = len(parts) * count
-    counter = Count(follow, total, finished, ITEMS)
-    work = partial(chunk_arrays, dict(parts))
-    for done in finished_jobs(work, jobs, workers, stop=follow.stop, say=follow.say, name=ITEMS):
+    spans = [(start, min(start + chunk, count)) for start in range(0, count, chunk)]
+    chunks: dict[tuple[int, int], Mapping[str, np.ndarray]] = {}
+    for span in spans:
+        stored = None if folder is None else load_arrays(folder.path / _file(span))
+        if stored is not None:
+            chunks[span] = stored
+    jobs = [span for span in spans if span not in chunks]
+    counter = Count(follow, count, sum(stop - start for start, stop in chunks), POSES)
+    do = partial(chunk_arrays, work)
+    for done in finished_jobs(do, jobs, workers, stop=follow.stop, say=follow.say, name=POSES):
         if done.problem is not None:
             raise done.problem if isinstance(done.problem, CdprError) else SweepError(done.words())
-        job, arrays = jobs[done.number], done.result or {}
+        span, arrays = jobs[done.number], done.result or {}
         if folder is not None:
-            folder.write_arrays(_file(job), arrays)
-        chunks[job] = arrays
-        counter.add(job[2] - job[1], job[0])
-    if counter.done < total:
-        words = f"stopped after {counter.done:.0f} of {total} {ITEMS}"
+            folder.write_arrays(_file(span), arrays)
+        chunks[span] = arrays
+        counter.add(span[1] - span[0], POSES)
+    if counter.done < count:
+        words = f"stopped after {counter.done:.0f} of {count} {POSES}"
         words += "" if folder is None else f"; the same command goes on in {folder.path}"
         raise StoppedError(words)
     return {
-        name: {key: np.concatenate([chunks[job][key] for job in mine]) for key in chunks[mine[0]]}
-        for name in parts
-        for mine in [sorted(job for job in chunks if job[0] == name)]
+        name: np.concatenate([chunks[span][name] for span in spans]) for name in chunks[spans[0]]
     }
 
 
-def chunk_arrays(parts: Mapping[str, PoseArrays], job: Chunk) -> dict[str, np.ndarray]:
-    """Arrays of a chunk."""
-    name, start, stop = job
-    return dict(parts[name](start, stop))
+def chunk_arrays(work: PoseArrays, span: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Arrays of the poses of a chunk."""
+    return dict(work(*span))
 
 
-def _file(job: Chunk) -> str:
-    name, start, stop = job
-    return f"{CHUNKS}/{name}-{start:07d}-{stop:07d}.npz"
+def _file(span: tuple[int, int]) -> str:
+    return f"{CHUNKS}/{POSES}-{span[0]:07d}-{span[1]:07d}.npz"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -155,7 +133,7 @@ class GridResult(Result):
 
     arguments: dict[str, Any]
     grid: WorkspaceGrid
-    versions: dict[str, str]
+    versions: dict[str, str] = field(default_factory=package_versions)
     robot: Robot | None = None
     folder: Path | None = None
     failed: Mapping[str, str] = field(default_factory=dict)
@@ -172,18 +150,22 @@ class GridResult(Result):
         return str(self.arguments.get("geometry", "geometry not recorded"))
 
     @abstractmethod
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Its arrays by name, as they are kept in `workspace.npz`."""
+
+    @abstractmethod
     def columns(self) -> dict[str, np.ndarray]:
         """A row a pose: positions and angles, and what is known there."""
+
+    @abstractmethod
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """What writes the page for the browser, and what should be known of it."""
 
     def to_dataframe(self) -> Any:
         """The columns as a pandas DataFrame."""
         import pandas as pd  # half a second, which few need
 
         return pd.DataFrame(self.columns())
-
-    @abstractmethod
-    def page(self, robot: Robot) -> tuple[Pictures, str]:
-        """What writes the page for the browser, and what should be known of it."""
 
     def last_lines(self) -> list[str]:
         """Sentences on how it ended and where it is."""
@@ -192,14 +174,15 @@ class GridResult(Result):
             *([] if self.folder is None else [f"results: {shown_path(self.folder)}"]),
         ]
 
-    def write(
-        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
-    ) -> dict[str, str]:
-        """Writes numbers, figures and the page.
+    def save(self, folder: Folder) -> None:
+        """Writes `workspace.npz`, and removes the chunks."""
+        about = json.dumps({"arguments": self.arguments, "versions": self.versions})
+        grid = {**dict(zip("xyz", self.grid.axes, strict=True)), "angles": self.grid.angles}
+        folder.write_arrays(ARRAYS, {"about": np.array(about), **grid, **self.arrays()})
+        shutil.rmtree(folder.path / CHUNKS, ignore_errors=True)
 
-        Returns:
-            Why figures were not written, by file.
-        """
+    def write(self, folder: Folder, formats: Sequence[str], follow: Follow) -> dict[str, str]:
+        """Writes numbers, figures and the page; returns why figures were not written, by file."""
         folder.write_json(RESULTS, self.as_dict())
         page, note = ({}, "") if self.robot is None else self.page(self.robot)
         if note:
@@ -218,31 +201,14 @@ class GridResult(Result):
         return replace(result, failed=failed, stopped=stopped)
 
 
-def save_grid(
-    folder: Folder, about: Mapping[str, Any], grid: WorkspaceGrid, arrays: Mapping[str, np.ndarray]
-) -> None:
-    """Writes `ARRAYS`, and removes the chunks.
-
-    Args:
-        folder: The folder.
-        about: What the arrays were computed for, and by what, for JSON.
-        grid: Their poses.
-        arrays: By name.
-    """
-    axes = dict(zip("xyz", grid.axes, strict=True))
-    words = np.array(json.dumps(dict(about)))
-    folder.write_arrays(ARRAYS, {"about": words, **axes, "angles": grid.angles, **arrays})
-    shutil.rmtree(folder.path / CHUNKS, ignore_errors=True)
-
-
 def load_grid(
     path: Path | str, needed: str, noun: str, command: str
-) -> tuple[dict[str, Any], WorkspaceGrid, dict[str, np.ndarray]]:
-    """Reads what `save_grid` wrote: about, grid, arrays.
+) -> tuple[dict[str, Any], WorkspaceGrid, dict[str, Any]]:
+    """Reads what `GridResult.save` wrote: arguments and versions, grid, arrays.
 
     Args:
         path: The file, or its folder.
-        needed: An array's name, or how it begins, without which it is a file of another kind.
+        needed: How the name of an array begins that files of this kind have.
         noun: What it should be, for the message.
         command: What writes such files, for the message.
 
@@ -251,19 +217,24 @@ def load_grid(
     """
     path = Path(path)
     path = path / ARRAYS if path.is_dir() else path
+    arrays = load_arrays(path) or {}
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as stored:
-            arrays = {key: stored[key] for key in stored.files}
         about = load_json(str(arrays.pop("about")))
         x, y, z, angles = (arrays.pop(name) for name in ("x", "y", "z", "angles"))
-        if not any(name.startswith(needed) for name in arrays):
-            raise KeyError(needed)
-        return about, WorkspaceGrid((x, y, z), angles), arrays
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise DataFileError(
-            f"{path}: found no stored {noun} ({type(problem).__name__}); accepted: {ARRAYS} of "
-            f"{command}"
-        ) from problem
+        grid = WorkspaceGrid((x, y, z), angles)
+        if any(name.startswith(needed) for name in arrays):
+            return {name: about[name] for name in ("arguments", "versions")}, grid, arrays
+    except (KeyError, ValueError):
+        pass
+    raise DataFileError(f"{path}: found no stored {noun}; accepted: {ARRAYS} of {command}")
+
+
+def reused(folder: Folder | None, follow: Follow) -> bool:
+    """True, and said, if an earlier call has finished the arrays of a folder."""
+    there = folder is not None and (folder.path / ARRAYS).is_file()
+    if there and folder is not None:
+        follow.say(f"reused the grid of {shown_path(folder.path)}")
+    return there
 
 
 def grid_words(grid: WorkspaceGrid, robot: Robot | None, rule: str = "all") -> str:
@@ -294,10 +265,8 @@ def region_numbers(
     volumes = [workspace_volume(places, axes, rule) for rule in VolumeRule]
     unit = volumes[0].unit.replace("^", "").replace("-", "1")
     return {
-        "poses": int(np.count_nonzero(inside)),
-        "of_poses": int(inside.size),
-        "places": int(np.count_nonzero(places)),
-        "of_places": int(places.size),
+        "poses": int(np.count_nonzero(inside)), "of_poses": int(inside.size),
+        "places": int(np.count_nonzero(places)), "of_places": int(places.size),
         **{f"{volume.rule}_{unit}": volume.value for volume in volumes},
         **{f"{volume.rule}_share": volume.share for volume in volumes},
-    }
+    }  # fmt: skip

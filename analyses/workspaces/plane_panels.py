@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.visualization.figure_style import new_figure, plain_numbers
@@ -23,22 +25,15 @@ ONE_CELL = 0.1
 ROOM = 0.04
 """Room around frame and exit points in a plane, as a share of its larger side."""
 
-CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+BORDERED_CELLS = 32
+"""So many cells side by side at most have visible borders, which would hide smaller ones."""
 
-CELLS = "Each point of the grid colours the cell around it."
-"""Title of the legends."""
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 
 
 class Panels(NamedTuple):
-    """A figure with a panel for each plane of a grid that is shown.
-
-    Attributes:
-        figure: The figure.
-        axes: Axes of each plane.
-        chosen: Number of each plane along `normal`.
-        normal: Axis normal to the planes.
-        handles: What of the robot is drawn, for the legend.
-    """
+    """A figure with axes for each of the chosen planes along the normal axis, and what of the robot
+    is drawn there, for the legend."""
 
     figure: Figure
     axes: list[Axes]
@@ -46,14 +41,47 @@ class Panels(NamedTuple):
     normal: int
     handles: list[Artist]
 
-    def shown(self, values: Array) -> Array:
-        """Values of the planes that are shown; values have shape (nx, ny, nz)."""
-        return np.take(values, self.chosen, self.normal)
-
 
 Paint = Callable[[Axes, list[Array], Callable[[Array], Array]], object]
 """Draws a plane, with borders of cells along its two axes, and what cuts the plane out of values of
 shape (nx, ny, nz), shape (nv, nu)."""
+
+
+def draw_regions(
+    grid: WorkspaceGrid, title: str, parts: Array, colors: Mapping[str, str | None],
+    robot: Robot | None, *, most: int, borders: bool = False,
+    columns: tuple[int, int] = (3, 3),
+) -> Figure:  # fmt: skip
+    """Planes of a grid, coloured by what holds at their points.
+
+    Args:
+        grid: The grid.
+        title: Title of the figure.
+        parts: Number of the colour of each point, shape (nx, ny, nz).
+        colors: Colours, with their labels; no label: it does not occur.
+        robot: As `draw_planes`, like most.
+        most: Largest number of planes.
+        borders: True: cells have borders, unless they are small.
+        columns: Columns of the legend below up to two panels, and below more.
+    """
+    table = ListedColormap(list(colors))
+
+    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
+        cells = plane(parts)
+        edge = "white" if borders and max(cells.shape) <= BORDERED_CELLS else "none"
+        axes.pcolormesh(
+            *edges, cells, cmap=table, vmin=-0.5, vmax=len(colors) - 0.5, edgecolors=edge,
+            linewidth=0.5,
+        )  # fmt: skip
+
+    panels = draw_planes(grid, title, paint, robot, most=most, parts=parts)
+    patches = [Patch(facecolor=color, label=label) for color, label in colors.items() if label]
+    panels.figure.legend(
+        handles=[*patches, *panels.handles], loc="outside lower center", title_fontsize=10,
+        ncols=columns[len(panels.axes) > 2],
+        title="Each point of the grid colours the cell around it.",
+    )  # fmt: skip
+    return panels.figure
 
 
 def draw_planes(
@@ -75,39 +103,40 @@ def draw_planes(
     """
     normal, u, v = plane_axes(grid.shape[1:])
     places, edges = grid.axes[normal], cell_edges(grid.axes, (u, v))
-    chosen = even_choice(len(places), most)
-    words = f"\n{len(chosen)} of {len(places)} planes" if len(chosen) < len(places) else ""
+    telling = np.arange(len(places))
     if parts is not None:
         flat = np.ptp(np.moveaxis(parts, normal, 0).reshape(len(places), -1), axis=1) == 0
-        telling = np.flatnonzero(~flat)
-        if 0 < len(telling) < len(places):
-            chosen = [int(telling[k]) for k in even_choice(len(telling), most)]
-            words = f"\n{len(chosen)} of {len(places)} planes"
-            words += ", the others have one colour" * (len(chosen) == len(telling))
+        telling = telling if np.all(flat) else np.flatnonzero(~flat)
+    chosen = [int(telling[k]) for k in even_choice(len(telling), most)]
+    if len(chosen) < len(places):
+        title += f"\n{len(chosen)} of {len(places)} planes"
+        title += ", the others have one colour" * (len(chosen) == len(telling))
     rows = -(-len(chosen) // columns)
     columns = -(-len(chosen) // rows)
     lower, upper = np.array([[edge[0], edge[-1]] for edge in edges]).T
     if robot is not None:
-        lower, upper = around_robot(robot, (u, v), lower, upper)
+        lower, upper = _around_robot(robot, (u, v), lower, upper)
     extents = upper - lower
     wide, high = extents * (width if columns > 1 else 5.6) / np.max(extents)
     size = max(1.4 + (wide + 0.3) * columns, 6.5), 2.4 + (high + 0.4) * rows
-    figure, axes = new_figure(rows, columns, size, title + words)
+    figure, axes = new_figure(rows, columns, size, title)
     # Panels of fixed proportions come closer to their neighbours than the layout knows.
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.12)
     panels: list[Axes] = list(np.ravel(axes))
     for number, (panel, k) in enumerate(zip(panels, chosen, strict=False)):
         paint(panel, edges, lambda values, k=k: np.take(values, k, normal).T)  # type: ignore[misc]
         if robot is not None:
-            draw_robot(panel, robot, (u, v), edges)
+            _draw_robot(panel, robot, (u, v), edges)
             panel.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]))
         panel.set_aspect("equal")
         panel.grid(False)
         panel.set_title(f"{'xyz'[normal]} = {places[k]:.3g} m", fontsize=11)
-        for side, along, extent in ((panel.xaxis, u, extents[0]), (panel.yaxis, v, extents[1])):
-            if robot is None:
-                most_ticks = 4 if columns > 1 else 8
-                side.set_ticks(_ticks(grid.axes[along], extent, max(extents), most_ticks))
+        for side, along in ((panel.xaxis, u), (panel.yaxis, v)):
+            if robot is None and len(grid.axes[along]) == 1:
+                side.set_ticks(grid.axes[along])
+            elif robot is None:
+                bins = 4 if columns > 1 else 8
+                side.set_major_locator(MaxNLocator(bins, steps=[1, 2, 5, 10]))
             plain_numbers(side)
         first, lowest = number % columns == 0, number + columns >= len(chosen)
         panel.tick_params(labelleft=first, labelbottom=lowest, labelsize=10)
@@ -120,11 +149,8 @@ def draw_planes(
 
 
 def plane_axes(counts: Sequence[int]) -> tuple[int, int, int]:
-    """Numbers of the axis normal to the planes that show most, and of their axes.
-
-    Args:
-        counts: Points along x, y, z.
-    """
+    """Numbers of the axis normal to the planes that show most, and of their axes, for so many
+    points along x, y, z."""
     nx, ny, nz = counts
     if nz > 1 and ny == 1:
         return 1, 0, 2
@@ -142,12 +168,8 @@ def even_choice(count: int, most: int) -> list[int]:
 def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
     """Borders of the cells around the points of some axes, shape (n + 1,) each [m].
 
-    Cells end at the grid's box, beyond which nothing was asked: the first and the last of an axis
-    are half as wide as the others. The cell of a one-point axis is as large as those of the others.
-
-    Args:
-        axes: Coordinates along x, y, z, ascending and evenly spaced, shape (n,) [m].
-        which: Numbers of the axes.
+    Cells end at the grid's box: the first and the last of an axis are half as wide as the others.
+    The cell of a one-point axis is as large as the cells of the others.
     """
     steps = [float(np.ptp(axes[k])) / max(len(axes[k]) - 1, 1) for k in which]
     widest = max(steps) or ONE_CELL
@@ -160,7 +182,7 @@ def cell_edges(axes: Sequence[Array], which: Sequence[int]) -> list[Array]:
     return borders
 
 
-def around_robot(
+def _around_robot(
     robot: Robot, plane: tuple[int, int], lower: Array, upper: Array
 ) -> tuple[Array, Array]:
     """Corners, shape (2,) each [m], of what holds a grid, the frame and the exit points."""
@@ -172,7 +194,7 @@ def around_robot(
     return lower - room, upper + room
 
 
-def draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence[Array]) -> None:
+def _draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence[Array]) -> None:
     """The grid's box, the frame, and the exit points of the cables, as they are seen in a plane."""
     u, v = plane
     boxes = (
@@ -187,22 +209,3 @@ def draw_robot(axes: Axes, robot: Robot, plane: tuple[int, int], edges: Sequence
         points[u], points[v], "^", color=OUTLINE.color, markersize=6, clip_on=False,
         label="exit points of the cables",
     )  # fmt: skip
-
-
-def _ticks(axis: Array, extent: float, longest: float, most: int) -> Array:
-    """Ticks along one side of a plane, as far apart as on the longer side unless that is too far.
-
-    Args:
-        axis: Coordinates of the points, shape (n,) [m].
-        extent: Length of the side [m].
-        longest: Length of the longer side [m].
-        most: Ticks on the longer side, about.
-    """
-    if len(axis) == 1:
-        return axis
-    low = float(axis[0] + axis[-1] - extent) / 2.0
-    spacing = np.diff(MaxNLocator(most, steps=[1, 2, 5, 10]).tick_values(0.0, longest))[0]
-    if extent < 2.0 * spacing:
-        spacing = np.diff(MaxNLocator(2, steps=[1, 2, 5, 10]).tick_values(0.0, extent))[0]
-    first, last = np.ceil(low / spacing), np.floor((low + extent) / spacing)
-    return np.asarray(np.arange(first, last + 1) * spacing)

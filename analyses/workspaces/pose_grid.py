@@ -31,6 +31,9 @@ MOST_POSES = 10_000_000
 MOST_TURNS = 10_000
 """Orientations of the largest grid."""
 
+SAME_PLACE = 1e-9
+"""Coordinates this near are the same [m]."""
+
 Span: TypeAlias = int | Array | Sequence[float]
 """An axis: a number of points in the default box, or lower, upper, step [m]."""
 
@@ -76,13 +79,8 @@ Orientations: TypeAlias = Annotated[
 ]  # fmt: skip
 
 
-def name_of(robot: Robot | str | Path) -> str:
-    """Name of a robot in the catalogue, or path of its file, by which its default grid is found."""
-    return robot.name if isinstance(robot, Robot) else str(robot)
-
-
 def make_grid(
-    robot: Robot, name: str, grid: WorkspaceGrid | Sequence[Span] | None = None,
+    robot: Robot, name: Robot | str | Path, grid: WorkspaceGrid | Sequence[Span] | None = None,
     orientation: Sequence[Array | Sequence[float]] = (), box: tuple[Array, Array] | None = None,
 ) -> WorkspaceGrid:  # fmt: skip
     """A grid of poses of a robot.
@@ -91,7 +89,7 @@ def make_grid(
 
     Args:
         robot: The robot.
-        name: Its name in the catalogue, or the path of its file, for its default grid.
+        name: As `workspace_defaults`.
         grid: A grid; or axes x, y, z, see `Span`; None: the robot's default.
         orientation: Angles (phi, theta, psi), shape (3,) or (k, 3) each [deg]; none: unturned.
         box: Lower and upper corner of the default box, shape (3,) each [m]; None: the robot's.
@@ -114,7 +112,8 @@ def make_grid(
         free = lower < upper
         step = np.where(free, step * (high - low) / np.where(free, upper - lower, 1.0), step)
         lower, upper = np.where(free, low, lower), np.where(free, high, upper)
-    axes: list[Span | None] = [None] * 3 if grid is None else list(grid)
+    defaults = list(zip(lower, upper, step, strict=True))
+    axes: list[Span] = list(defaults) if grid is None else list(grid)
     if len(axes) != 3:
         raise WorkspaceGridError(
             f"grid: found {grid!r}; accepted: a WorkspaceGrid, or for each of x, y, z a number of "
@@ -122,13 +121,10 @@ def make_grid(
         )
     rows = [np.atleast_2d(np.asarray(angles, float)) for angles in orientation]
     angles = np.radians(np.vstack(rows)) if rows else np.zeros((1, 3))
-    defaults = list(zip(lower, upper, step, strict=True))
-    parts = list(zip("xyz", axes, defaults, strict=True))
-    counts = [_count(*part) for part in parts]
-    poses = math.prod(counts, start=float(len(angles)))
+    poses = math.prod(map(_count, "xyz", axes, defaults), start=float(len(angles)))
     if poses > MOST_POSES:  # which may not fit into memory
         raise WorkspaceGridError(f"grid: found {poses:.4g} poses; accepted: at most {MOST_POSES:g}")
-    x, y, z = (_axis(*part) for part in parts)
+    x, y, z = map(_axis, "xyz", axes, defaults)
     result = WorkspaceGrid((x, y, z), angles)
     check_grid(robot, result)
     return result
@@ -138,44 +134,39 @@ Default = tuple[float, float, float]
 """Lower, upper and step along an axis of the default grid [m]."""
 
 
-def _count(name: str, span: Span | None, default: Default) -> float:
+def _count(name: str, span: Span, default: Default) -> float:
     """Points along an axis; 1 of a span that makes no sense, which `_axis` refuses."""
-    low, high, step = default
     if isinstance(span, int | np.integer):
-        if low == high and span > 1:
+        if default[0] == default[1] and span > 1:
             raise WorkspaceGridError(
                 f"grid: found {span} points along {name}, where the default box is flat; "
-                f"accepted: 1, at {name} = {low:g} [m]"
+                f"accepted: 1, at {name} = {default[0]:g} [m]"
             )
         return float(span)
-    if span is not None:
-        if np.shape(span) != (3,):
-            raise WorkspaceGridError(
-                f"grid: found {span!r} along {name}; accepted: a number of points, or lower, "
-                "upper, step [m]"
-            )
-        low, high, step = map(float, span)
+    if np.shape(span) != (3,):
+        raise WorkspaceGridError(
+            f"grid: found {span!r} along {name}; accepted: a number of points, or lower, "
+            "upper, step [m]"
+        )
+    low, high, step = map(float, span)
     sound = bool(np.all(np.isfinite([low, high, step]))) and step > 0.0 and high >= low
     return (high - low) / step + 1.0 if sound else 1.0
 
 
-def _axis(name: str, span: Span | None, default: Default) -> Array:
+def _axis(name: str, span: Span, default: Default) -> Array:
     """Coordinates along an axis, shape (n,) [m]."""
     if isinstance(span, int | np.integer):
         return axis_by_count(default[0], default[1], int(span), name)
-    low, high, step = default if span is None else map(float, span)
+    low, high, step = map(float, span)
     return axis_by_step(low, high, step, name)
 
 
 def grid_arguments(grid: WorkspaceGrid) -> dict[str, Any]:
     """A grid as one of the things that numbers depend on; values for `plain`."""
     return {
-        "lower_m": grid.lower,
-        "upper_m": grid.upper,
-        "step_m": grid.steps,
-        "points": list(grid.shape[1:]),
-        "angles_rad": grid.angles,
-    }
+        "lower_m": grid.lower, "upper_m": grid.upper, "step_m": grid.steps,
+        "points": list(grid.shape[1:]), "angles_rad": grid.angles,
+    }  # fmt: skip
 
 
 def plain(value: Any) -> Any:
@@ -188,22 +179,16 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, CableSet):  # what neither Jacobian nor statics depend on is left out
-        names = [
-            "p_WA",
-            "p_PB",
-            *(["pulley_radius", "swivel_axis"] if value.has_pulleys() else []),
-        ]
-        if value.has_platform_pulleys():
-            names += ["anchor_pulley_radius", "anchor_swivel_axis"]
-        if np.any(value.arm > 0.0):
-            names.append("arm")
+        names = ["p_WA", "p_PB"]
+        names += ["pulley_radius", "swivel_axis"] if value.has_pulleys() else []
+        names += ["anchor_pulley_radius", "anchor_swivel_axis"] * value.has_platform_pulleys()
+        names += ["arm"] if np.any(value.arm > 0.0) else []
         return {"kind": "CableSet", **{name: plain(getattr(value, name)) for name in names}}
     if is_dataclass(value):
         content = {
-            field.name: plain(getattr(value, field.name))
-            for field in fields(value)
+            field.name: plain(getattr(value, field.name)) for field in fields(value)
             if not field.metadata.get(ONLY_GIVEN, False) or getattr(value, field.name)
-        }
+        }  # fmt: skip
         return {"kind": type(value).__name__, **content}
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
@@ -215,46 +200,38 @@ def plain(value: Any) -> Any:
 def check_grid(robot: Robot, grid: WorkspaceGrid) -> None:
     """Checks that a grid has points in the robot's frame and, of a planar robot, lies in its plane.
 
-    A frame that was assumed when the robot was imported bounds no grid.
+    A grid may reach beyond the frame; a frame that was assumed when the robot was imported bounds
+    none.
 
     Raises:
         StabilityError: It does not.
     """
-    _check_planar(robot, grid)
-    if not robot.frame.assumed:
-        _check_frame(robot, grid)
-
-
-def _check_planar(robot: Robot, grid: WorkspaceGrid) -> None:
     motion = robot.motion_type()
     lower, upper = robot.reach()
     for k in np.flatnonzero(lower == upper):
         name, along = "xyz"[k], grid.axes[k]
-        if len(along) != 1 or abs(float(along[0]) - lower[k]) > 1e-9:
+        if len(along) != 1 or abs(float(along[0]) - lower[k]) > SAME_PLACE:
             kind, place = ("planar", "plane") if motion.is_plane else (robot.motion, "line")
             raise StabilityError(
                 f"grid: found {name} from {along[0]:g} to {along[-1]:g}; accepted for the {kind} "
-                f"{robot.name}: its {place} {name} = {lower[k]:g} [m]"
+                f"robot {robot.name}: its {place} {name} = {lower[k]:g} [m]"
             )
-    if motion.num_turns != 1 or motion.rows is None:
+    if motion.num_turns == 1 and motion.rows is not None:
+        still = [k for k in range(3) if k != motion.rows[0]]
+        if np.any(grid.angles[:, still] != 0.0):
+            names = " = ".join(("phi", "theta", "psi")[k] for k in still)
+            raise StabilityError(
+                "grid: found tilted orientations; accepted for the planar robot "
+                f"{robot.name}: {names} = 0"
+            )
+    if robot.frame.assumed:
         return
-    still = [k for k in range(3) if k != motion.rows[0]]
-    if np.any(grid.angles[:, still] != 0.0):
-        names = " = ".join(("phi", "theta", "psi")[k] for k in still)
-        raise StabilityError(
-            f"grid: found tilted orientations; accepted for the planar {robot.name}: {names} = 0"
-        )
-
-
-def _check_frame(robot: Robot, grid: WorkspaceGrid) -> None:
-    """A grid may reach beyond the frame, but has to have points inside it."""
-    lower, upper = robot.frame.lower, robot.frame.upper
-    for number, (name, axis) in enumerate(zip("xyz", grid.axes, strict=True)):
-        inside = (axis >= lower[number] - 1e-9) & (axis <= upper[number] + 1e-9)
-        if not np.any(inside):
-            corners = [", ".join(f"{value:g}" for value in corner) for corner in (lower, upper)]
+    low, high = robot.frame.lower, robot.frame.upper
+    for name, axis, least, most in zip("xyz", grid.axes, low, high, strict=True):
+        if not np.any((axis >= least - SAME_PLACE) & (axis <= most + SAME_PLACE)):
             raise StabilityError(
                 f"grid: found {name} from {axis[0]:g} to {axis[-1]:g} by which no point is inside "
-                f"the frame of {robot.name}; accepted: points within ({corners[0]}) to "
-                f"({corners[1]}) [m]"
+                f"the frame of {robot.name}; accepted: points within "
+                f"({', '.join(f'{value:g}' for value in low)}) to "
+                f"({', '.join(f'{value:g}' for value in high)}) [m]"
             )

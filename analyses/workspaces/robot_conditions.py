@@ -17,10 +17,15 @@ from cdpr_drake.analyses.workspaces.conditions import (
     PoseConditions,
     SimulatedBreaks,
 )
-from cdpr_drake.analyses.workspaces.servo_stability import robot_stability, scenario_view
+from cdpr_drake.analyses.workspaces.servo_stability import (
+    robot_stability,
+    scenario_view,
+    servo_scenario,
+    visual_servo,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import TensionProblemError, WorkspaceError
-from cdpr_drake.models.robot_loader import as_robot, robot_reference
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
@@ -49,12 +54,9 @@ BREAKING = "acrobot_broken_redistributed"
 
 
 def static_case(
-    robot: Robot,
-    limits: tuple[float, float] | None = None,
-    mass: float | None = None,
-    wrench: Array | None = None,
-    pulleys: bool = True,
-) -> StaticCase:
+    robot: Robot, limits: tuple[float, float] | None = None, mass: float | None = None,
+    wrench: Array | None = None, pulleys: bool = True,
+) -> StaticCase:  # fmt: skip
     """A robot's platform on its cables.
 
     Args:
@@ -85,25 +87,17 @@ def static_case(
             f"robot {robot.name}: found {robot.motion} with axis {robot.motion_type().axis}; "
             "accepted for workspaces: motions along axes of W, and not 2R3T"
         )
+    weight = (robot.platform.mass if mass is None else mass) * robot.gravity
     return StaticCase(
-        robot.cable_set(pulleys),
-        np.full(m, low),
-        np.full(m, high),
-        (robot.platform.mass if mass is None else mass) * robot.gravity,
-        robot.center_of_mass(),
-        wrench=load,
-        rows=rows,
-        down=robot.down(),
-    )
+        robot.cable_set(pulleys), np.full(m, low), np.full(m, high), weight,
+        robot.center_of_mass(), wrench=load, rows=rows, down=robot.down(),
+    )  # fmt: skip
 
 
 def interference_bodies(
-    robot: Robot,
-    obstacles: Array | Obstacles | None = None,
-    exit_free: float | None = None,
-    anchor_free: float | None = None,
-    pulleys: bool = True,
-) -> Surroundings:
+    robot: Robot, obstacles: Array | Obstacles | None = None, exit_free: float | None = None,
+    anchor_free: float | None = None, pulleys: bool = True,
+) -> Surroundings:  # fmt: skip
     """What a robot's cables and platform may meet: the platform's box, beams and obstacles.
 
     Args:
@@ -118,59 +112,53 @@ def interference_bodies(
     Raises:
         WorkspaceError: A length is negative.
     """
+    frame, width = robot.frame, robot.frame.beam_width()
     body = box_row(robot.box_center(), robot.platform.size)
     if anchor_free is None:
         inside = body[12:, np.newaxis] - np.abs(robot.cable_set().p_PB - body[9:12, np.newaxis])
         deepest = float(np.max(np.min(inside, axis=0)))
         anchor_free = max(deepest, 0.0) + ANCHOR_DIAMETERS * float(np.max(robot.diameters()))
-    bodies = obstacles if isinstance(obstacles, Obstacles) else Obstacles()
-    if obstacles is not None and not isinstance(obstacles, Obstacles):
-        bodies = Obstacles(obstacles)
+    fixtures = beams(frame.lower, frame.upper, width)
+    if frame.beams:
+        fixtures = np.array([
+            box_row((beam.start + beam.end) / 2.0, beam.size(width), beam.axes())
+            for beam in frame.beams
+        ])  # fmt: skip
+    bodies = as_obstacles(obstacles)
     return Surroundings(
-        robot.cable_set(pulleys),
-        robot.diameters() / 2.0,
-        body[np.newaxis],
-        _fixtures(robot),
-        bodies.boxes,
-        robot.frame.beam_width() if exit_free is None else exit_free,
-        anchor_free,
-        bodies.solids,
-    )
+        robot.cable_set(pulleys), robot.diameters() / 2.0, body[np.newaxis], fixtures,
+        bodies.boxes, width if exit_free is None else exit_free, anchor_free, bodies.solids,
+    )  # fmt: skip
 
 
-def _fixtures(robot: Robot) -> Array:
-    """The frame's beams as boxes in W, shape (f, 15): its own, or those on the edges of its box."""
-    frame, width = robot.frame, robot.frame.beam_width()
-    if not frame.beams:
-        return beams(frame.lower, frame.upper, width)
-    rows = [
-        box_row((beam.start + beam.end) / 2.0, beam.size(width), beam.axes())
-        for beam in frame.beams
-    ]
-    return np.array(rows)
+def as_obstacles(obstacles: Array | Obstacles | None) -> Obstacles:
+    """Obstacles of boxes, shape (o, 15); None: none."""
+    if isinstance(obstacles, Obstacles):
+        return obstacles
+    return Obstacles() if obstacles is None else Obstacles(np.asarray(obstacles, float))
 
 
 def pose_conditions(
     robot: Robot, *, limits: tuple[float, float] | None = None, mass: float | None = None,
     wrench: Array | None = None, required: SpatialSet | None = None,
     accelerations: SpatialSet | None = None, velocities: Array | None = None,
-    clearance: float = 0.0, around: Surroundings | None = None, scenario: str | None = None,
+    clearance: float = 0.0, around: Surroundings | None = None, scenario: Any = None,
     pulleys: bool = True, method: str | None = None,
 ) -> PoseConditions:  # fmt: skip
     """What kinds and measures know of a robot, without stability and simulated breaks.
 
     Args:
         robot: The robot.
-        limits: Smallest and largest tension [N]; None: the robot's.
+        limits: As `static_case`, like wrench and pulleys.
         mass: Mass of the platform [kg]; None: the robot's. Its inertia is spread as the robot's.
-        wrench: External wrench beside the weight, shape (6,) [N m, N].
+        wrench: As `static_case`.
         required: Wrenches to resist.
         accelerations: Accelerations to have (angular, linear) [rad/s^2, m/s^2].
         velocities: Velocities at which to have them, shape (k, 6) [rad/s, m/s].
         clearance: Least clearance [m].
         around: What cables and platform may meet; None: `interference_bodies` of the robot.
         scenario: Name or path of the scenario whose camera shall see its target.
-        pulleys: True: cables run over the robot's pulleys. False: pulleys are ignored.
+        pulleys: As `static_case`.
         method: Method whose tensions must hold the weight for the kind `static`; None: any
             tensions.
 
@@ -184,70 +172,37 @@ def pose_conditions(
         method_for(method, case.cables.count - len(case.rows), False)
     platform = rigid_platform(robot)
     mass = robot.platform.mass if mass is None else mass
-    inertia = platform.I_PPo * (mass / platform.mass)
+    body = mass, platform.p_PCo, platform.I_PPo * (mass / platform.mass)
     motion = None
     if accelerations is not None or velocities is not None:
-        motion = MotionDemand(
-            mass, platform.p_PCo, inertia, accelerations or SpatialSet(),
-            np.zeros((1, 6)) if velocities is None else velocities,
-        )  # fmt: skip
+        rates = np.zeros((1, 6)) if velocities is None else velocities
+        motion = MotionDemand(*body, accelerations or SpatialSet(), rates)
     return PoseConditions(
-        case, around or interference_bodies(robot, pulleys=pulleys), robot.gravity,
-        (mass, platform.p_PCo, inertia), clearance, required, motion,
-        None if scenario is None else camera_view(robot, scenario), method=method,
+        case, around or interference_bodies(robot, pulleys=pulleys), robot.gravity, body,
+        clearance, required, motion,
+        None if scenario is None else _camera_view(robot, scenario), method=method,
     )  # fmt: skip
 
 
-def camera_view(robot: Robot, scenario: str) -> CameraView:
-    """What the camera of a visual servo's scenario shall see.
-
-    Args:
-        robot: The robot, in the place of the scenario's.
-        scenario: Name or path of a visual servo's scenario.
-
-    Raises:
-        WorkspaceError: The camera is not on the platform, or the target does not rest.
-        ScenarioError: There is no such scenario, or the robot does not fit into it.
-    """
-    from cdpr_drake.systems.diagrams.load import load_scenario  # few workspaces have one
-
-    with robot_reference(robot, "a workspace") as name:
-        loaded = load_scenario(scenario, [f"robot={name}"])
-    if loaded.target.carrier != "world" or loaded.target.motion is not None:
-        raise WorkspaceError(
-            f"scenario {scenario}: found a target that moves; accepted: one that rests in the "
-            "world, seen by a camera on the platform"
-        )
-    mount = robot.camera_mount(loaded.camera.mount)
-    pinhole = servo_pinhole(loaded.camera, robot)
-    target = TARGETS[loaded.target.kind](loaded.target)
-    return CameraView(target, loaded.target.pose.transform(), mount.pose.transform(), pinhole)
+def _camera_view(robot: Robot, scenario: Any) -> CameraView:
+    """The resting target of a scenario, and the camera on the platform that shall see it."""
+    servo = servo_scenario(robot, scenario)
+    return CameraView(
+        TARGETS[servo.target.kind](servo.target), servo.target.pose.transform(),
+        robot.camera_mount(servo.camera.mount).pose.transform(),
+        servo_pinhole(servo.camera, robot),
+    )  # fmt: skip
 
 
-def simulated_breaks(
-    robot: Robot, grid: WorkspaceGrid, scenario: str | None = None,
-    reactions: Sequence[str] | None = None, moving: Array | Sequence[float] | None = None,
-    after: float = 2.0, limits: tuple[float, float] | None = None,
+def _simulated_breaks(
+    robot: Robot, grid: WorkspaceGrid, scenario: Any, reactions: Sequence[str] | None,
+    moving: Array | Sequence[float] | None, after: float, limits: tuple[float, float] | None,
 ) -> SimulatedBreaks:  # fmt: skip
-    """Single breaks of cables at the poses of a grid; arguments as of `compute_workspace`.
-
-    Raises:
-        WorkspaceError: Something cannot be simulated, or makes no sense.
-        ScenarioError: There is no such scenario.
-    """
     from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING
     from cdpr_drake.analyses.simulation.break_survival import BreakRequest
-    from cdpr_drake.systems.diagrams.load import load_scenario  # few workspaces have one
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
-    loaded = load_scenario(scenario or BREAKING)
-    if not isinstance(loaded, Scenario):
-        raise WorkspaceError(
-            f"scenario {scenario}: found kind {loaded.kind}; accepted for the kind {SURVIVES}: a "
-            "visual servo"
-        )
     request = BreakRequest(
-        scenario=loaded,
+        scenario=visual_servo(scenario or BREAKING, f"the kind {SURVIVES}"),
         reactions=DEFAULT_SAVING if reactions is None else tuple(reactions),
         velocity=np.zeros(3) if moving is None else np.asarray(moving, float),
         after=after, limits=limits,
@@ -258,58 +213,51 @@ def simulated_breaks(
 
 def grid_conditions(
     robot: Robot | str | Path, kinds: Sequence[str], measures: Sequence[str], grid: WorkspaceGrid,
-    scenario: str | None = None, reactions: Sequence[str] | None = None,
+    scenario: Any = None, reactions: Sequence[str] | None = None,
     moving: Array | Sequence[float] | None = None, after: float = 2.0, **values: Any,
 ) -> PoseConditions:  # fmt: skip
     """What kinds and measures know of a robot at the poses of a grid.
 
-    Args:
-        robot: The robot, or its name or path.
-        kinds: Names of `KINDS`.
-        measures: Names of `MEASURES`.
-        grid: The poses.
-        scenario: This and the further ones are those of `compute_workspace`.
-        reactions: See scenario.
-        moving: See scenario.
-        after: See scenario.
-        values: Further arguments of `pose_conditions`.
+    Scenario, reactions, moving and after are those of `compute_workspace`; `values` are further
+    arguments of `pose_conditions`.
 
     Raises:
         CdprError: A kind or measure lacks something, or is not possible for the robot.
     """
     loaded = as_robot(robot, "a workspace")
-    falls = SURVIVES in kinds or bool({*measures} & {*OF_BREAKS})
+    falls = bool({*kinds, *measures} & {SURVIVES, *OF_BREAKS})
     # The camera of a scenario whose winches and controller count has nothing to see.
     sees = not falls or bool({*kinds} & {"target-visible", "stable"})
     about = pose_conditions(loaded, scenario=scenario if sees else None, **values)
     if falls:
-        for name in ("mass", "wrench", "required", "accelerations"):
-            if values.get(name) is not None:
-                raise WorkspaceError(
-                    f"{name}: found with kinds {SURVIVES}, which simulates the robot as its file "
-                    "has it; accepted: without"
-                )
-        breaks = simulated_breaks(
-            loaded, grid, scenario, reactions, moving, after, values.get("limits")
-        )
+        alone = {name: values.get(name) for name in ("mass", "wrench", "required", "accelerations")}
+        _refuse(
+            f"found with kinds {SURVIVES}, which simulates the robot as its file has it; "
+            "accepted: without", **alone,
+        )  # fmt: skip
+        limits = values.get("limits")
+        breaks = _simulated_breaks(loaded, grid, scenario, reactions, moving, after, limits)
         about = replace(about, breaks=breaks)
+    else:
+        words = f"found kinds {','.join(kinds)}; accepted: {SURVIVES} among them"
+        _refuse(words, reactions=reactions, moving=moving)
     if "stable" in kinds:
         view = None if scenario is None else scenario_view(robot, scenario)
         about = replace(about, stable=robot_stability(robot, grid, view))
-    _check_kinds(loaded, kinds, measures, about, reactions=reactions, moving=moving)
+    _check_kinds(loaded, kinds, measures, about)
     return about
 
 
+def _refuse(why: str, **arguments: object) -> None:
+    for name, value in arguments.items():
+        if value is not None:
+            raise WorkspaceError(f"{name}: {why}")
+
+
 def _check_kinds(
-    robot: Robot, kinds: Sequence[str], measures: Sequence[str], about: PoseConditions,
-    **of_breaks: object,
-) -> None:  # fmt: skip
+    robot: Robot, kinds: Sequence[str], measures: Sequence[str], about: PoseConditions
+) -> None:
     """Refuses kinds and measures that are not possible for the robot, or lack something."""
-    for name, value in of_breaks.items():
-        if value is not None and about.breaks is None:
-            raise WorkspaceError(
-                f"{name}: found kinds {','.join(kinds)}; accepted: {SURVIVES} among them"
-            )
     for name in kinds:
         needs = KINDS[name].needs
         if needs and getattr(about, needs) is None:
@@ -329,6 +277,6 @@ def _check_kinds(
     moved = [row - 3 for row in about.case.rows if row >= 3]
     if "payload" in measures and not np.any(np.array(about.case.down)[moved]):
         raise WorkspaceError(
-            f"measures payload: found the planar {robot.name}, whose plane carries the weight; "
-            "accepted: robots that hold it by their cables"
+            f"measures payload: found the planar robot {robot.name}, whose plane carries the "
+            "weight; accepted: robots that hold it by their cables"
         )

@@ -7,16 +7,16 @@ scenario's camera, object and desired view.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.workspaces.pose_grid import name_of
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
-from cdpr_drake.errors import StabilityError
+from cdpr_drake.errors import ScenarioError, StabilityError
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
 from cdpr_drake.models.robot_loader import as_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
@@ -53,15 +53,7 @@ the camera [m]."""
 
 @dataclass(frozen=True, eq=False)
 class ServoStability:
-    """A verdict on the servo at the poses of a grid.
-
-    Attributes:
-        case: Robot, scheme, target.
-        bounds: Bounds of the perturbations.
-        grid: The poses.
-        options: How hard to look.
-        verdict: One of `stability.verdict.VERDICTS`.
-    """
+    """A verdict on the servo of a case at the poses of a grid, under bounds of perturbations."""
 
     case: StabilityCase
     bounds: PerturbationBounds
@@ -123,7 +115,7 @@ def robot_stability(
         view = replace(view or ServoView(), lever=PRINTED)
     loaded = as_robot(robot, "stability")
     if bounds is None:
-        bounds = workspace_defaults(loaded, name_of(robot)).bounds
+        bounds = workspace_defaults(loaded, robot).bounds
     elif not isinstance(bounds, PerturbationBounds):
         bounds = load_bounds(Path(bounds))
     case = stability_case(loaded, scheme, grid, view)
@@ -131,18 +123,11 @@ def robot_stability(
 
 
 def stability_case(
-    robot: Robot,
-    scheme: str,
-    grid: WorkspaceGrid,
-    view: ServoView | None = None,
+    robot: Robot, scheme: str, grid: WorkspaceGrid, view: ServoView | None = None
 ) -> StabilityCase:
     """A robot under a scheme, its cables from fixed exit points, as the thesis computes workspaces.
 
-    Args:
-        robot: The robot.
-        scheme: One of `stability.SCHEMES`.
-        grid: Its box is where the servo has to go.
-        view: What the camera sees and shall see; None: as in the servoing thesis.
+    The servo has to go anywhere in the box of the grid; scheme and view as `robot_stability`.
 
     Raises:
         StabilityError: Too few cables, several on one winch, or a scheme that the robot's dimension
@@ -190,39 +175,57 @@ def varied(base: PerturbationBounds, parameter: str, value: float) -> Perturbati
     return base.varied(**{name: value})
 
 
-def scenario_view(robot: Robot | str | Path, scenario: str | Scenario) -> ServoView:
-    """What a scenario's camera sees and shall see.
-
-    Args:
-        robot: The robot, or its name or path, in the place of the scenario's.
-        scenario: Name or path of a visual servo's scenario, or the scenario.
-
-    Returns:
-        The object where the scenario has it, the view that it wants, the robot's camera mounting
-        that it uses, and the interaction matrix that its servo really uses: that of the object's
-        position, not of the error.
+def visual_servo(scenario: Any, purpose: str, overrides: Sequence[str] = ()) -> Scenario:
+    """A visual servo's scenario by name or path; a scenario stays as it is.
 
     Raises:
-        StabilityError: The object moves, or the camera is not on the platform: the criterion is
-            about neither.
-        ScenarioError: There is no such scenario, or the robot does not fit into it.
+        ScenarioError: There is none, or it is of another kind; the purpose is what it is for.
     """
     from cdpr_drake.systems.diagrams.load import load_scenario  # few workspaces have one
+    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
-    if isinstance(scenario, str | Path):
-        where = f"scenario {scenario}"
-        with robot_reference(robot, "stability") as name:
-            loaded = load_scenario(str(scenario), [f"robot={name}"])
-    else:
-        where, loaded = f"scenario {scenario.name}", scenario
+    named = isinstance(scenario, str | Path)
+    loaded = load_scenario(str(scenario), overrides) if named else scenario
+    if not isinstance(loaded, Scenario):
+        raise ScenarioError(
+            f"scenario {loaded.name}: found kind {loaded.kind}; accepted for {purpose}: a visual "
+            "servo"
+        )
+    return loaded
+
+
+def servo_scenario(robot: Robot | str | Path, scenario: Any) -> Scenario:
+    """A visual servo with the robot instead of its own, whose camera sees an object that rests.
+
+    Raises:
+        ScenarioError: There is none, it is of another kind, the robot does not fit into it, the
+            object moves, or the camera is not on the platform.
+    """
+    with robot_reference(robot, "a workspace") as name:
+        loaded = visual_servo(scenario, "workspaces", [f"robot={name}"])
     if loaded.target.carrier != "world":
-        raise StabilityError(
-            f"{where}: found target.carrier {loaded.target.carrier}; accepted: world, with the "
-            "camera on the platform"
+        raise ScenarioError(
+            f"scenario {loaded.name}: found target.carrier {loaded.target.carrier}; accepted: "
+            "world, with the camera on the platform"
         )
     if loaded.target.motion is not None:
-        raise StabilityError(f"{where}: found target.motion; accepted: an object that rests")
-    return ServoView(
-        FixedObject(loaded.target.pose.transform(), loaded.desired.transform()),
-        as_robot(robot, "stability").camera_mount(loaded.camera.mount).pose.transform(),
-    )
+        raise ScenarioError(
+            f"scenario {loaded.name}: found target.motion; accepted: an object that rests"
+        )
+    return loaded
+
+
+def scenario_view(robot: Robot | str | Path, scenario: Any) -> ServoView:
+    """What a scenario's camera sees and shall see, with the robot instead of the scenario's.
+
+    The object is where the scenario has it, the view is the one that it wants, the camera is where
+    the mounting of the robot has it. The interaction matrix is the one that its servo really uses:
+    of the object's position, not of the error.
+
+    Raises:
+        ScenarioError: As `servo_scenario`.
+    """
+    loaded = servo_scenario(robot, scenario)
+    mount = as_robot(robot, "stability").camera_mount(loaded.camera.mount)
+    target = FixedObject(loaded.target.pose.transform(), loaded.desired.transform())
+    return ServoView(target, mount.pose.transform())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -30,31 +29,29 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.grid_runs import (
-    ARRAYS,
     GridResult,
     grid_folder,
     grid_words,
     load_grid,
     region_numbers,
+    reused,
     run_grid,
-    save_grid,
 )
 from cdpr_drake.analyses.workspaces.pose_grid import (
     Grid,
     Orientations,
     grid_arguments,
     make_grid,
-    name_of,
     plain,
 )
 from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.analyses.workspaces.servo_stability import (
     KINDS,
     STRAIGHT,
+    ServoStability,
     robot_stability,
     scenario_view,
     varied,
@@ -66,7 +63,6 @@ from cdpr_drake.models.robot_statics import as_wrench
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import SCHEMES
 from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
-from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -75,9 +71,6 @@ if TYPE_CHECKING:
 
 CHUNK_POSES = {"sampled": 1024, "searched": 256, "certified": 64}
 """Poses of a chunk for each verdict: seconds of work, which Ctrl-C waits for."""
-
-STATIC = "static"
-"""Name of the static feasible workspace among the parts of the grid's arrays."""
 
 BASE, GIVEN = "baseline", "given"
 """Names of the servoing thesis' bounds, and of other ones; the others are variations of them."""
@@ -110,17 +103,20 @@ class Stability(GridResult):
     """Stability workspaces of one robot and scheme under one or several perturbation bounds.
 
     Attributes:
-        names: Names of the perturbation bounds, as in arguments["bounds"].
         stable: True if the servo is stable under each bounds, shape (b, k, nx, ny, nz).
         margin: Smallest eigenvalue of the symmetric part of Pi, as the verdict knows it, same
             shape [-]; minus infinity if Pi does not exist or nothing was proven.
         feasible: True if the platform can be held, shape (k, nx, ny, nz).
     """
 
-    names: tuple[str, ...]
     stable: np.ndarray
     margin: np.ndarray
     feasible: np.ndarray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the perturbation bounds."""
+        return tuple(self.arguments["bounds"])
 
     @property
     def interaction_matrix(self) -> str:
@@ -207,11 +203,9 @@ class Stability(GridResult):
             columns[f"margin {name}"] = self.margin[k].reshape(-1)
         return columns
 
-    def save(self, folder: Folder) -> None:
-        """Writes `workspace.npz`."""
-        about = {"arguments": self.arguments, "versions": self.versions, "bounds": self.names}
-        names = ("stable", "margin", "feasible")
-        save_grid(folder, about, self.grid, {name: getattr(self, name) for name in names})
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Names are those of the attributes."""
+        return {"stable": self.stable, "margin": self.margin, "feasible": self.feasible}
 
     def page(self, robot: Robot) -> tuple[Pictures, str]:
         """What writes the page for the browser, and what should be known of it."""
@@ -227,11 +221,7 @@ def load_stability(path: Path | str) -> Stability:
         DataFileError: There is no such file, or it is not of that kind.
     """
     about, grid, arrays = load_grid(path, "stable", "workspaces", "cdpr stability")
-    return Stability(
-        arguments=about["arguments"], grid=grid, names=tuple(about["bounds"]),
-        stable=arrays["stable"], margin=arrays["margin"], feasible=arrays["feasible"],
-        versions=about["versions"],
-    )  # fmt: skip
+    return Stability(**about, grid=grid, **arrays)
 
 
 @verb()
@@ -297,7 +287,7 @@ def assess_stability(
     loaded = as_robot(robot, "assess_stability")
     if mass is not None and not (math.isfinite(mass) and mass >= 0.0):
         raise TensionProblemError(f"mass: found {mass:g}; accepted: >= 0 [kg]")
-    poses = make_grid(loaded, name_of(robot), grid, orientation)
+    poses = make_grid(loaded, robot, grid, orientation)
     options = VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces)
     view = None if scenario is None else scenario_view(robot, scenario)
     servo = robot_stability(
@@ -317,19 +307,42 @@ def assess_stability(
     })  # fmt: skip
     title = f"{loaded.name}-{scheme}-{verdict}"
     with grid_folder(folder, arguments, title, overwrite, follow) as results:
-        if results is not None and (results.path / ARRAYS).is_file():
-            follow.say(f"reused the grid of {shown_path(results.path)}")
-            result = load_stability(results.path)
-        else:
-            parts = {STATIC: partial(held_poses, held, poses)} | {
-                name: replace(servo, bounds=each) for each, name in _different(named).items()
-            }
-            chunk = CHUNK_POSES[verdict]
-            arrays = run_grid(parts, poses.size, chunk, results, workers, follow)
-            result = _assembled(arguments, poses, named, arrays)
-            if results is not None:
-                result.save(results)
-        return replace(result, robot=loaded).written(results, formats, follow)
+        if results is not None and reused(results, follow):
+            return replace(load_stability(results.path), robot=loaded).written(
+                results, formats, follow
+            )
+        servos = [replace(servo, bounds=each) for each in named.values()]
+        work = partial(judged_poses, held, servos)
+        chunk = max(CHUNK_POSES[verdict] // len(set(named.values())), 1)
+        arrays = run_grid(work, poses.size, chunk, results, workers, follow)
+        # The poses come first in these arrays, then the bounds.
+        shaped: dict[str, Any] = {name: array.T.reshape(*array.shape[1:], *poses.shape)
+                  for name, array in arrays.items()}  # fmt: skip
+        result = Stability(arguments=arguments, grid=poses, robot=loaded, **shaped)
+        if results is not None:
+            result.save(results)
+        return result.written(results, formats, follow)
+
+
+def judged_poses(
+    held: StaticCase, servos: Sequence[ServoStability], start: int, stop: int
+) -> dict[str, np.ndarray]:
+    """Arrays of the poses start to stop of a grid.
+
+    `feasible`, shape (n,), see servoing thesis (1.25); `stable` and `margin` under the bounds of
+    each servo, shape (n, b). Equal bounds are judged once.
+    """
+    grid = servos[0].grid
+    feasible = statically_feasible(held, grid.positions(start, stop), grid.rotations(start, stop))
+    judged: dict[PerturbationBounds, dict[str, np.ndarray]] = {}
+    for servo in servos:
+        if servo.bounds not in judged:
+            judged[servo.bounds] = servo(start, stop)
+    columns = {
+        name: np.stack([judged[servo.bounds][name] for servo in servos], axis=1)
+        for name in ("stable", "margin")
+    }
+    return {"feasible": feasible, **columns}
 
 
 def _variations(base: PerturbationBounds, name: str, vary: Any) -> dict[str, PerturbationBounds]:
@@ -344,33 +357,3 @@ def _variations(base: PerturbationBounds, name: str, vary: Any) -> dict[str, Per
                     "accepted: values further apart"
                 )
     return named
-
-
-def _different(named: Mapping[str, PerturbationBounds]) -> dict[PerturbationBounds, str]:
-    """Different bounds with the first name of each; they are computed once."""
-    first: dict[PerturbationBounds, str] = {}
-    for name, bounds in named.items():
-        first.setdefault(bounds, name)
-    return first
-
-
-def held_poses(
-    case: StaticCase, grid: WorkspaceGrid, start: int, stop: int
-) -> dict[str, np.ndarray]:
-    """Array `feasible` of the poses start to stop, shape (n,). Source: servoing thesis (1.25)."""
-    positions, rotations = grid.positions(start, stop), grid.rotations(start, stop)
-    return {"feasible": statically_feasible(case, positions, rotations)}
-
-
-def _assembled(
-    arguments: dict[str, Any], grid: WorkspaceGrid, named: Mapping[str, PerturbationBounds],
-    arrays: Mapping[str, Mapping[str, np.ndarray]],
-) -> Stability:  # fmt: skip
-    parts = [arrays[_different(named)[bounds]] for bounds in named.values()]
-    shape = grid.shape
-    return Stability(
-        arguments=arguments, grid=grid, names=tuple(named),
-        stable=np.array([part["stable"].reshape(shape) for part in parts]),
-        margin=np.array([part["margin"].reshape(shape) for part in parts]),
-        feasible=arrays[STATIC]["feasible"].reshape(shape), versions=package_versions(),
-    )  # fmt: skip

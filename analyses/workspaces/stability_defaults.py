@@ -32,54 +32,44 @@ COUNTS = (17, 17, 9)
 """Without such a file the grid has so many points along x, y, z."""
 
 
+TURN = {"at_least": 0.0, "at_most": 180.0}
+
+
 @dataclass(kw_only=True)
 class BoundsSettings:
     """Bounds on the error between true and believed model; what is left out is known exactly."""
 
     source: str = text("Where the values stand.", "")
     r_bp: float = number("Position of the platform.", "m", 0.0, at_least=0.0)
-    d_theta_bp_deg: float = number(
-        "Orientation of the platform.", "deg", 0.0, at_least=0.0, at_most=180.0
-    )
+    d_theta_bp_deg: float = number("Orientation of the platform.", "deg", 0.0, **TURN)
     r_pc: float = number("Position of the camera on the platform.", "m", 0.0, at_least=0.0)
-    d_theta_pc_deg: float = number(
-        "Orientation of the camera on the platform.", "deg", 0.0, at_least=0.0, at_most=180.0
-    )
+    d_theta_pc_deg: float = number("Orientation of the camera on the platform.", "deg", 0.0, **TURN)
     r_A: float = number("Exit points.", "m", 0.0, at_least=0.0)
     r_B: float = number("Anchor points.", "m", 0.0, at_least=0.0)
     r_s: float = number("Position of the object seen by the camera.", "m", 0.0, at_least=0.0)
     d_theta_s_deg: float = number(
-        "Orientation of the object seen by the camera.", "deg", 0.0, at_least=0.0, at_most=180.0
+        "Orientation of the object seen by the camera.", "deg", 0.0, **TURN
     )
     encoders_deg: np.ndarray = array(
-        "Encoders of the joints, pan and tilt, of a camera that turns on such.",
-        "deg",
-        (2,),
-        (0.0, 0.0),
-        at_least=0.0,
-    )
+        "Encoders of the joints, pan and tilt, of a camera that turns on such.", "deg", (2,),
+        (0.0, 0.0), at_least=0.0,
+    )  # fmt: skip
     exits: str = text(
         "How exit points are wrong: each by itself in a ball, all by one common shift, or each in "
-        "a cube.",
-        "independent",
-        choices=DIRECTIONS,
-    )
+        "a cube.", "independent", choices=DIRECTIONS,
+    )  # fmt: skip
     anchors: str = text("The same for anchor points.", "independent", choices=DIRECTIONS)
 
     def bounds(self) -> PerturbationBounds:
         """The bounds in SI units."""
+        lengths = {name: getattr(self, name) for name in ("r_bp", "r_pc", "r_A", "r_B", "r_s")}
+        turns = {
+            name: float(np.radians(getattr(self, f"{name}_deg")))
+            for name in ("d_theta_bp", "d_theta_pc", "d_theta_s")
+        }
+        joints = encoder_turn(*np.radians(self.encoders_deg))
         return PerturbationBounds(
-            r_bp=self.r_bp,
-            r_pc=self.r_pc,
-            r_A=self.r_A,
-            r_B=self.r_B,
-            r_s=self.r_s,
-            d_theta_bp=float(np.radians(self.d_theta_bp_deg)),
-            d_theta_pc=float(np.radians(self.d_theta_pc_deg)),
-            d_theta_s=float(np.radians(self.d_theta_s_deg)),
-            d_theta_joints=encoder_turn(*np.radians(self.encoders_deg)),
-            exits=self.exits,
-            anchors=self.anchors,
+            **lengths, **turns, d_theta_joints=joints, exits=self.exits, anchors=self.anchors
         )
 
 
@@ -103,14 +93,9 @@ class WorkspaceSettings:
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceDefaults:
-    """Grid and bounds of a robot.
+    """Grid and perturbation bounds of a robot, and where they come from.
 
-    Attributes:
-        lower: Lower corner of the grid, shape (3,) [m].
-        upper: Upper corner, shape (3,) [m].
-        step: Distance between neighbours, shape (3,) [m].
-        bounds: Perturbation bounds.
-        source: Where they come from.
+    The grid has corners lower and upper, and a step between neighbours, shape (3,) each [m].
     """
 
     lower: Array
@@ -131,7 +116,7 @@ def load_bounds(path: Path) -> PerturbationBounds:
     return load_typed(BoundsSettings, path, error=BoundsFileError).bounds()
 
 
-def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
+def workspace_defaults(robot: Robot, name: Robot | str | Path) -> WorkspaceDefaults:
     """The servoing thesis' grid and bounds for a robot.
 
     A robot that the thesis does not have gets a grid in its frame and the bounds of the spatial or
@@ -139,15 +124,14 @@ def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
 
     Args:
         robot: The robot.
-        name: Its name in the catalogue, or the path of its file.
+        name: Its name in the catalogue, the path of its file, or itself, with its name.
     """
+    name = name.name if isinstance(name, Robot) else str(name)
     path = robot_file(name).parent / FILE if name in robot_names() else None
     if path is not None and path.is_file():
         settings = load_typed(WorkspaceSettings, path, error=BoundsFileError)
-        grid = settings.grid
-        return WorkspaceDefaults(
-            grid.lower, grid.upper, grid.step, settings.bounds.bounds(), settings.source
-        )
+        grid, bounds = settings.grid, settings.bounds.bounds()
+        return WorkspaceDefaults(grid.lower, grid.upper, grid.step, bounds, settings.source)
     size = robot.frame.upper - robot.frame.lower
     lower, upper = robot.frame.lower + INSET * size, robot.frame.upper - INSET * size
     lower[2] = robot.frame.lower[2]
@@ -157,9 +141,7 @@ def workspace_defaults(robot: Robot, name: str) -> WorkspaceDefaults:
     step = (upper - lower) / (np.array(COUNTS) - 1)
     step[step == 0.0] = 1.0  # one point along z
     return WorkspaceDefaults(
-        lower,
-        upper,
-        step,
+        lower, upper, step,
         PLANAR_BASELINE if robot.motion_type().is_horizontal_body else BASELINE,
         "grid from the robot's frame; bounds of the servoing thesis' robots, frame 1.2 m",
-    )
+    )  # fmt: skip

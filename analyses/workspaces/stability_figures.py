@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from cdpr_drake.analyses.visualization.figure_style import (
     COVERED_LINE,
@@ -21,9 +17,8 @@ from cdpr_drake.analyses.visualization.figure_style import (
     new_figure,
 )
 from cdpr_drake.analyses.visualization.solids import draw_solid
-from cdpr_drake.analyses.workspaces.plane_panels import CELLS, draw_planes
+from cdpr_drake.analyses.workspaces.plane_panels import draw_regions
 from cdpr_drake.analyses.workspaces.servo_stability import KINDS
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError
 from cdpr_drake.palette import IDEAL, WORKSPACES, look_of
 from cdpr_drake.workspaces.volume import surface_quads
@@ -44,9 +39,6 @@ LABELS = {
 MOST_PLANES = 16
 """So many planes at most are drawn."""
 
-BORDERED_CELLS = 32
-"""So many cells side by side at most have visible borders, which would hide smaller ones."""
-
 LINES: dict[str, dict[str, Any]] = {
     "Z": COVERED_LINE,
     "SZ": {"linestyle": "--", "linewidth": 1.4, "marker": "s", "markersize": 4},
@@ -62,27 +54,12 @@ def planes_figure(stability: Stability, bounds: str | None = None) -> Figure:
         bounds: Name of the perturbation bounds; None: the first.
     """
     parts = 2 * stability.places("Z", bounds) + stability.places("S", bounds)
-    colors = ListedColormap(list(COLORS.values()))
-
-    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
-        cells = plane(parts)
-        borders = "white" if max(cells.shape) <= BORDERED_CELLS else "none"
-        axes.pcolormesh(
-            *edges, cells, cmap=colors, vmin=-0.5, vmax=3.5, edgecolors=borders, linewidth=0.5
-        )
-
-    title = _title(
-        stability, "Where the servo is stable and where the platform can be held", bounds
-    )
-    panels = draw_planes(
-        stability.grid, title, paint, stability.robot, most=MOST_PLANES, parts=parts
-    )
-    patches = [Patch(facecolor=color, label=LABELS[key]) for key, color in COLORS.items()]
-    panels.figure.legend(
-        handles=[*patches, *panels.handles], loc="outside lower center",
-        ncols=4 if len(panels.axes) > 2 else 2, title=CELLS, title_fontsize=10,
+    words = "Where the servo is stable and where the platform can be held"
+    colors = {color: LABELS[key] for key, color in COLORS.items()}
+    return draw_regions(
+        stability.grid, _title(stability, words, bounds), parts, colors, stability.robot,
+        most=MOST_PLANES, borders=True, columns=(2, 4),
     )  # fmt: skip
-    return panels.figure
 
 
 def solids_figure(stability: Stability, bounds: str | None = None) -> Figure:
@@ -108,19 +85,14 @@ def solids_figure(stability: Stability, bounds: str | None = None) -> Figure:
         handles = draw_solid(axes, quads, COLORS[kind], (lower, upper), exits)
         volume = stability.volume(kind, "corners", bounds)
         axes.set_title(
-            f"{kind}, {words}\n{volume.value:.3g} m³, {100 * volume.share:.1f} %",
-            fontsize=11,
-            y=1.0,
-            pad=0,
-        )
+            f"{kind}, {words}\n{volume.value:.3g} m³, {100 * volume.share:.1f} %", fontsize=11,
+            y=1.0, pad=0,
+        )  # fmt: skip
     figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=2,
+        handles=handles, loc="outside lower center", ncols=2, title_fontsize=10,
         title="Solids are the cells between points of the grid with all eight corners inside; "
         "the figure of planes shows the cells around points.",
-        title_fontsize=10,
-    )
+    )  # fmt: skip
     return figure
 
 
@@ -142,27 +114,20 @@ def curves_figure(stability: Stability) -> Figure:
     """Share of the grid's box in Z, SZ and S against each varied bound, the others as they are."""
     points_of = curves(stability)
     groups = {
-        "m": [p for p in points_of if not p.startswith("d_theta")],
-        "deg": [p for p in points_of if p.startswith("d_theta")],
+        "m": [name for name in points_of if not name.startswith("d_theta")],
+        "deg": [name for name in points_of if name.startswith("d_theta")],
     }
     groups = {unit: parameters for unit, parameters in groups.items() if parameters}
     figure, grid = new_figure(
-        1,
-        len(groups),
-        (6.5 * len(groups) + 0.5, 5.2),
+        1, len(groups), (6.5 * len(groups) + 0.5, 5.2),
         _about(stability, "Size of the workspace against bounds of the perturbations"),
-    )
+    )  # fmt: skip
     for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
         for parameter in parameters:
-            values = [value for value, _ in points_of[parameter]]
-            look = look_of(
-                parameter, list(points_of)
-            )  # few bounds have colours far from each other
+            values, names = zip(*points_of[parameter], strict=True)
+            look = look_of(parameter, list(points_of))  # few have colours far from each other
             for kind, line in LINES.items():
-                shares = [
-                    100.0 * stability.volume(kind, "corners", name).share
-                    for _, name in points_of[parameter]
-                ]
+                shares = [100.0 * stability.volume(kind, "corners", name).share for name in names]
                 style = {**line, "color": look.color, "marker": look.marker}
                 axes.plot(values, shares, label=f"{kind}, {parameter} [{unit}]", **style)
         static = 100.0 * stability.volume("S", "corners").share

@@ -32,15 +32,9 @@ LOOKS = 400
 
 
 def find_timed_sets(
-    robot: Robot,
-    static: ProvenSets,
-    things: Sequence[MovingObstacle],
-    ends: tuple[Array, Array],
-    whole: float,
-    *,
-    clearance: float = 0.0,
-    say: Callable[[str], None] = lambda words: None,
-) -> TimedSets:
+    robot: Robot, static: ProvenSets, things: Sequence[MovingObstacle], ends: tuple[Array, Array],
+    whole: float, *, clearance: float = 0.0, say: Callable[[str], None] = lambda words: None,
+) -> TimedSets:  # fmt: skip
     """Proves poses and times that are clear of what moves, among those that are proven otherwise.
 
     Args:
@@ -55,9 +49,9 @@ def find_timed_sets(
     Raises:
         WorkspaceError: The sets have no cells, or as `sets_in_time`.
     """
-    if static.cells is None or static.conditions is None or static.conditions.around is None:
+    if static.cells is None or static.conditions is None:
         raise WorkspaceError("sets: found sets of a file; accepted: sets that were found")
-    horizon = looked_at(robot, things, whole)
+    horizon = _horizon(robot, things, whole)
     steps = FEWEST_STEPS
     while steps < MOST_STEPS and horizon / steps > whole / FINE:
         steps *= 2
@@ -73,31 +67,27 @@ def find_timed_sets(
     return sets_in_time(cells, *ends, speed, about=about, say=say)
 
 
-def looked_at(robot: Robot, things: Sequence[MovingObstacle], whole: float) -> float:
+def _horizon(robot: Robot, things: Sequence[MovingObstacle], whole: float) -> float:
     """Until when poses are looked at [s]: for a while after all rests, or has left the frame.
 
     Proofs do not depend on it.
     """
     low, high = robot.reach()
-    times, last = np.linspace(0.0, LONGEST * whole, LOOKS), 0.0
+    longest, last = LONGEST * whole, 0.0
     for thing in things:
         settled = thing.settled()
-        if settled <= 0.0:
-            continue
-        until = np.linspace(0.0, settled, LOOKS) if np.isfinite(settled) else times
-        there = [t for t in until if _near(thing, float(t), low, high)]
-        last = max(last, float(there[-1]) if there else 0.0)
-    if last >= times[-1]:
-        forever = any(not np.isfinite(thing.settled()) for thing in things)
-        return last if forever and last == times[-1] else last + AFTER * whole
-    return last + AFTER * whole
+        until = settled if np.isfinite(settled) else longest
+        times = np.linspace(0.0, until, LOOKS) if settled > 0.0 else np.zeros(0)
+        near = [float(time) for time in times if _near(thing, float(time), low, high)]
+        last = max([last, *near])
+    forever = any(not np.isfinite(thing.settled()) for thing in things)
+    return last if forever and last == longest else last + AFTER * whole
 
 
 def _near(thing: MovingObstacle, time: float, low: Array, high: Array) -> bool:
-    """Whether something is in the frame."""
-    for shape in thing.at(time):
-        least = np.min(shape.points, axis=0) - shape.radius
-        most = np.max(shape.points, axis=0) + shape.radius
-        if np.all((least <= high) & (low <= most)):
-            return True
-    return False
+    """True if some of it is in the frame."""
+    return any(
+        np.all(np.min(shape.points, axis=0) - shape.radius <= high)
+        and np.all(low <= np.max(shape.points, axis=0) + shape.radius)
+        for shape in thing.at(time)
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,6 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -30,12 +29,10 @@ from cdpr_drake.analyses.frame.words import (
     one_of,
     words,
 )
-from cdpr_drake.analyses.reporting.output_folder import shown_path
-from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.box_certificates import (
-    BoxSearch,
     box_search,
     certified_boxes,
     refined_boxes,
@@ -50,13 +47,12 @@ from cdpr_drake.analyses.workspaces.conditions import (
     PoseConditions,
     conditions_at,
 )
-from cdpr_drake.analyses.workspaces.grid_runs import ARRAYS, ITEMS, grid_folder, run_grid
+from cdpr_drake.analyses.workspaces.grid_runs import grid_folder, reused, run_grid
 from cdpr_drake.analyses.workspaces.pose_grid import (
     Grid,
     Orientations,
     grid_arguments,
     make_grid,
-    name_of,
     plain,
 )
 from cdpr_drake.analyses.workspaces.robot_conditions import grid_conditions, interference_bodies
@@ -213,48 +209,68 @@ def compute_workspace(
     Source: Gazebo thesis 2.6; servoing thesis 1.2.2, 1.3.3.
     """
     loaded, kinds, measures = as_robot(robot, "compute_workspace"), _each(kinds), _each(measures)
-    _check_names(kinds, measures, orientations)
-    _check_shapes(
-        hull, rays, mesh, certify, boxes, boxes_mesh, unbounded, box, refine, refine_reach,
-        refine_boxes, orientations,
-    )  # fmt: skip
-    poses = make_grid(loaded, name_of(robot), grid, orientation, box)
+    _check_names(kinds=(kinds, KINDS), measures=(measures, MEASURES),
+                 orientations=([orientations], RULES))  # fmt: skip
+    _check_hull(hull, rays, mesh, unbounded, box)
+    _check_boxes(certify, boxes, boxes_mesh, orientations, refine, refine_reach, refine_boxes)
+    poses = make_grid(loaded, robot, grid, orientation, box)
     region = None if box is None else (np.asarray(box[0], float), np.asarray(box[1], float))
-    if SURVIVES in kinds or {*measures} & {*OF_BREAKS}:
-        measures = (*measures, *(each for each in OF_BREAKS if each not in measures))
+    if {*kinds, *measures} & {SURVIVES, *OF_BREAKS}:
+        measures = tuple(dict.fromkeys([*measures, *OF_BREAKS]))
+    if mass is not None and not (math.isfinite(mass) and mass > 0.0):
+        raise WorkspaceError(f"mass: found {mass:g}; accepted: > 0 [kg]")
+    if isinstance(obstacles, str | Path):
+        obstacles = load_obstacles(Path(obstacles))
     about = grid_conditions(
         robot, kinds, measures, poses, scenario, reactions, moving, after, limits=limits,
-        mass=_positive(mass), wrench=None if wrench is None else np.asarray(wrench, float),
+        mass=mass, wrench=None if wrench is None else np.asarray(wrench, float),
         required=_required(required, force, moment), accelerations=_accelerations(accelerations),
         velocities=_velocities(velocities), clearance=clearance, pulleys=pulleys, method=method,
-        around=interference_bodies(
-            loaded, load_obstacles(Path(obstacles)) if isinstance(obstacles, str | Path) else
-            obstacles, exit_free, anchor_free, pulleys,
-        ),
+        around=interference_bodies(loaded, obstacles, exit_free, anchor_free, pulleys),
     )  # fmt: skip
-    arguments = _arguments(loaded, kinds, measures, orientations, poses, about, scenario)
-    search, hull_ends, cast = None, None, None
+    search = None
     if certify:
         errors = exit_error, anchor_error
         search = box_search(loaded, about, kinds, poses.angles, errors, region)
-    if hull is not None:
-        follow.progress(Progress("casting rays", 0.0, rays, unit="rays"))
-        hull_ends = hull_bound(loaded, region, unbounded)
-        cast = robot_hull(
-            loaded, about, kinds, hull, hull_ends, angles=poses.angles, rule=orientations,
-            rays=rays, tolerance=tolerance,
-        )  # fmt: skip
+    arguments = _arguments(loaded, about, poses, {
+        "kinds": kinds, "measures": measures, "orientations": orientations, "method": method,
+        "scenario": scenario or "",
+    })  # fmt: skip
     title = f"{loaded.name}-{kinds[0] if len(kinds) == 1 else f'{len(kinds)}-kinds'}"
     with grid_folder(folder, arguments, title, overwrite, follow) as results:
-        result = _on_grid(arguments, kinds, measures, poses, about, results, workers, follow)
-        result = replace(
-            result, robot=loaded, hull=cast, bound=hull_ends, search=search, region=region
-        )
+        ends = cast = None
+        if hull is not None:
+            follow.progress(Progress("casting rays", 0.0, rays, unit="rays"))
+            ends = hull_bound(loaded, region, unbounded)
+            cast = robot_hull(
+                loaded, about, kinds, hull, ends, angles=poses.angles, rule=orientations,
+                rays=rays, tolerance=tolerance,
+            )  # fmt: skip
+        if results is not None and reused(results, follow):
+            result = load_workspace(results.path)
+        else:
+            chunk = min((CHUNKS[kind] for kind in kinds if kind in CHUNKS), default=CHUNK)
+            chunk = CHUNKS[SURVIVES] if about.breaks is not None else chunk
+            work = partial(conditions_at, about, poses, (*kinds, *measures))
+            arrays = run_grid(work, poses.size, chunk, results, workers, follow)
+            shaped = {name: array.reshape(poses.shape) for name, array in arrays.items()}
+            result = Workspace(
+                arguments=arguments, grid=poses, holds={name: shaped[name] for name in kinds},
+                values={name: shaped[name] for name in measures},
+            )  # fmt: skip
+            if results is not None:
+                result.save(results)
+        result = replace(result, robot=loaded, hull=cast, bound=ends, search=search, region=region)
         if search is not None:
-            way = None if refine is None else np.asarray(refine, float)
-            result = _proven(
-                result, search, boxes, way, refine_reach, refine_boxes, results, follow
-            )
+            how = {"on_progress": _counting(follow, boxes), "should_stop": follow.stop}
+            proven, finer = certified_boxes(search, boxes, results, **how), None
+            if refine is not None and proven.finished:
+                how["on_progress"] = _counting(follow, refine_boxes)
+                way = np.asarray(refine, float)
+                proven, finer = refined_boxes(
+                    proven, search, way, refine_reach, refine_boxes, results, **how
+                )
+            result = replace(result, boxes=proven, refined=finer, stopped=not proven.finished)
         if mesh is not None and cast is not None:
             with whole_file(Path(mesh)) as part:
                 write_hull(cast, part)
@@ -264,50 +280,53 @@ def compute_workspace(
         return result.written(results, formats, follow)
 
 
+def _counting(follow: Follow, total: int) -> Callable[[int, float], None]:
+    counter = Count(follow, total, unit="boxes")
+    return lambda judged, share: counter.add(judged - counter.done, f"{share:.1%} open")
+
+
 def _each(words: str | Sequence[str]) -> tuple[str, ...]:
     """Names, each once."""
     return tuple(dict.fromkeys(names(words) if isinstance(words, str) else words))
 
 
-def _check_names(kinds: Sequence[str], measures: Sequence[str], rule: str) -> None:
-    for argument, values, table in (
-        ("kinds", kinds, KINDS), ("measures", measures, MEASURES), ("orientations", [rule], RULES),
-    ):  # fmt: skip
+def _check_names(**arguments: tuple[Sequence[str], Mapping[str, Any]]) -> None:
+    for argument, (values, table) in arguments.items():
         for name in values:
             if name not in table:
                 raise WorkspaceError(f"{argument} {name!r} is unknown; {closest(name, table)}")
-    if not kinds:
+    if not arguments["kinds"][0]:
         raise WorkspaceError(f"kinds: found none; accepted: {', '.join(KINDS)}")
 
 
-def _check_shapes(
-    hull: Any, rays: int, mesh: Path | None, certify: bool, boxes: int, boxes_mesh: Path | None,
-    unbounded: bool, box: Any, refine: Any, reach: float, refine_boxes: int, rule: str,
-) -> None:  # fmt: skip
-    """Refuses what does not go together of hull and boxes, before anything is computed."""
-    for name, file, needs, there, endings in (
-        ("mesh", mesh, "hull", hull is not None, MESH_ENDINGS),
-        ("boxes_mesh", boxes_mesh, "certify", certify, GRID_ENDINGS),
-    ):
-        if file is not None and not there:
-            raise WorkspaceError(f"{name}: needs {needs}; accepted: both")
-        if file is not None:
-            mesh_ending(Path(file), endings)
+def _check_hull(hull: Any, rays: int, mesh: Path | None, unbounded: bool, box: Any) -> None:
     if unbounded and (hull is None or box is not None):
         wrong = "needs hull" if hull is None else "found box"
         raise WorkspaceError(f"unbounded: {wrong}; accepted: with hull and without box")
     if hull is not None and np.shape(hull) != (3,):
         raise WorkspaceError(f"hull: found {hull!r}; accepted: x, y, z [m]")
-    for name, count in (("rays", rays), ("boxes", boxes), ("refine_boxes", refine_boxes)):
+    if rays < 1:
+        raise WorkspaceError(f"rays: found {rays}; accepted: at least 1")
+    if mesh is not None and hull is None:
+        raise WorkspaceError("mesh: needs hull; accepted: both")
+    if mesh is not None:
+        mesh_ending(Path(mesh), MESH_ENDINGS)
+
+
+def _check_boxes(
+    certify: bool, boxes: int, mesh: Path | None, rule: str, refine: Any, reach: float, more: int
+) -> None:
+    for name, value in {"boxes_mesh": mesh, "refine": refine}.items():
+        if value is not None and not certify:
+            raise WorkspaceError(f"{name}: needs certify; accepted: both")
+    for name, count in {"boxes": boxes, "refine_boxes": more}.items():
         if count < 1:
             raise WorkspaceError(f"{name}: found {count}; accepted: at least 1")
+    if mesh is not None:
+        mesh_ending(Path(mesh), GRID_ENDINGS)
     if certify and rule != "all":
         raise WorkspaceError(f"certify: found orientations {rule}; accepted: all")
-    if refine is None:
-        return
-    if not certify:
-        raise WorkspaceError("refine: needs certify; accepted: both")
-    way = np.asarray(refine, float)
+    way = np.zeros((1, 3)) if refine is None else np.asarray(refine, float)
     if way.ndim != 2 or way.shape[1] != 3 or not len(way) or not np.all(np.isfinite(way)):
         raise WorkspaceError(
             f"refine: found shape {way.shape}; accepted: corners x, y, z, at least one [m]"
@@ -316,29 +335,14 @@ def _check_shapes(
         raise WorkspaceError(f"refine_reach: found {reach:g} m; accepted: at least 0")
 
 
-def _positive(mass: float | None) -> float | None:
-    if mass is not None and not (math.isfinite(mass) and mass > 0.0):
-        raise WorkspaceError(f"mass: found {mass:g}; accepted: > 0 [kg]")
-    return mass
-
-
 def _required(
     required: SpatialSet | Path | str | None, force: float | None, moment: float | None
 ) -> SpatialSet | None:
-    """Wrenches to resist: a set, its file, or up to a force and a moment."""
+    """Wrenches to resist: a set, its file, or up to a force [N] and a moment [N m] along axes."""
     if force is None and moment is None:
         return load_wrench_set(Path(required)) if isinstance(required, str | Path) else required
     if required is not None:
         raise WorkspaceError("required: found force or moment too; accepted: one way")
-    return wrench_box(force, moment)
-
-
-def wrench_box(force: float | None, moment: float | None) -> SpatialSet:
-    """Wrenches up to a force along each axis [N] and a moment about each [N m]; None: none.
-
-    Raises:
-        WorkspaceError: One is negative or not finite.
-    """
     for name, value in (("force", force), ("moment", moment)):
         if value is not None and not (math.isfinite(value) and value >= 0.0):
             raise WorkspaceError(f"{name}: found {value:g}; accepted: a finite number >= 0")
@@ -367,9 +371,8 @@ def _velocities(values: Any) -> Array | None:
 
 
 def _arguments(
-    robot: Robot, kinds: Sequence[str], measures: Sequence[str], rule: str, grid: WorkspaceGrid,
-    about: PoseConditions, scenario: str | None,
-) -> dict[str, Any]:  # fmt: skip
+    robot: Robot, about: PoseConditions, grid: WorkspaceGrid, names: Mapping[str, Any]
+) -> dict[str, Any]:
     """All that the arrays depend on, for JSON; equal arguments give equal arrays."""
     over, view, stable = about.case.cables.has_pulleys(), about.view, about.stable
     cables = "over pulleys" + ", but for the kind stable: from fixed exit points" * bool(stable)
@@ -382,65 +385,14 @@ def _arguments(
         simulated = robot.geometry_words(about.breaks.request.scenario.cables.pulleys)
         geometry += "" if simulated == geometry else f"; simulated breaks: {simulated}"
     geometry += f"; {STRAIGHT}" if stable and over else ""
-    breaks = {} if about.breaks is None else {"breaks": about.breaks.arguments()}
-    arguments = {
+    result: dict[str, Any] = plain({
         "cables": cables, "geometry": geometry, "cdpr_drake": code_version(), "robot": robot.name,
-        "kinds": kinds, "measures": measures, "orientations": rule, "method": about.method,
-        "grid": grid_arguments(grid), "statics": about.case,
+        **names, "grid": grid_arguments(grid), "statics": about.case,
         "elasticity_n": about.case.cables.stiffness, "body": about.body, "gravity": about.gravity,
         "clearance_m": about.clearance, "surroundings": about.around, "required": about.required,
-        "motion": about.motion, "scenario": scenario or "",
-        "view": view and {"X_WO": view.X_WO, "X_PC": view.X_PC},
+        "motion": about.motion, "view": view and {"X_WO": view.X_WO, "X_PC": view.X_PC},
         "stable": stable and {
             "case": stable.case, "bounds": stable.bounds.as_dict(), "verdict": stable.verdict,
         },
-    }  # fmt: skip
-    result: dict[str, Any] = plain(arguments) | breaks
-    return result
-
-
-def _on_grid(
-    arguments: dict[str, Any], kinds: tuple[str, ...], measures: tuple[str, ...],
-    grid: WorkspaceGrid, about: PoseConditions, folder: Folder | None,
-    workers: int | str | None, follow: Follow,
-) -> Workspace:  # fmt: skip
-    """The workspace on its grid, computed, or read if an earlier call has finished it."""
-    if folder is not None and (folder.path / ARRAYS).is_file():
-        follow.say(f"reused the grid of {shown_path(folder.path)}")
-        return load_workspace(folder.path)
-    chunk = min((CHUNKS[kind] for kind in kinds if kind in CHUNKS), default=CHUNK)
-    chunk = CHUNKS[SURVIVES] if about.breaks is not None else chunk
-    work = partial(conditions_at, about, grid, (*kinds, *measures))
-    arrays = run_grid({ITEMS: work}, grid.size, chunk, folder, workers, follow)[ITEMS]
-    shaped = {name: array.reshape(grid.shape) for name, array in arrays.items()}
-    result = Workspace(
-        arguments=arguments, grid=grid, versions=package_versions(),
-        holds={name: shaped[name] for name in kinds},
-        values={name: shaped[name] for name in measures},
-    )  # fmt: skip
-    if folder is not None:
-        result.save(folder)
-    return result
-
-
-def _proven(
-    result: Workspace, search: BoxSearch, most: int, way: Array | None, reach: float,
-    more: int, folder: Folder | None, follow: Follow,
-) -> Workspace:  # fmt: skip
-    """The workspace with its boxes; if it is stopped, with those that are judged by then."""
-
-    def telling(total: int) -> Callable[[int, float], None]:
-        counter = Count(follow, total, unit="boxes")
-        return lambda judged, share: counter.add(judged - counter.done, f"{share:.1%} open")
-
-    boxes, refined = (
-        certified_boxes(search, most, folder, on_progress=telling(most), should_stop=follow.stop),
-        None,
-    )
-    if way is not None and boxes.finished:
-        refined = refined_boxes(
-            boxes, search, way, reach, more, folder, on_progress=telling(more),
-            should_stop=follow.stop,
-        )  # fmt: skip
-        boxes = refined.boxes
-    return replace(result, boxes=boxes, refined=refined, search=search, stopped=not boxes.finished)
+    })  # fmt: skip
+    return result if about.breaks is None else result | {"breaks": about.breaks.arguments()}

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
@@ -19,7 +18,12 @@ from matplotlib.ticker import MaxNLocator
 
 from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
 from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
-from cdpr_drake.analyses.workspaces.plane_panels import CELLS, draw_planes, plane_axes
+from cdpr_drake.analyses.workspaces.plane_panels import (
+    CORNERS,
+    draw_planes,
+    draw_regions,
+    plane_axes,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 from cdpr_drake.workspaces import box_expansion_kernel
@@ -39,7 +43,8 @@ PROVEN = {
 }
 """Label, colour and hatching of boxes by what is proven."""
 
-SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+EDGES: dict[str, Any] = {"edgecolor": "#555555", "linewidth": 0.1}
+"""Of boxes."""
 
 MOST_PLANES = 12
 
@@ -84,50 +89,39 @@ def planes_figure(workspace: Workspace, measure: str | None = None) -> Figure:
 def _kinds_figure(workspace: Workspace) -> Figure:
     each = [workspace.places(kind) for kind in workspace.holds]
     parts = np.where(workspace.places(ALL), 2.0, np.where(np.any(each, axis=0), 1.0, 0.0))
-    colors = ListedColormap([OUTSIDE, SOME, INSIDE])
-
-    def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
-        axes.pcolormesh(*edges, plane(parts), cmap=colors, vmin=-0.5, vmax=2.5)
-
-    title = _title(workspace, None)
-    panels = draw_planes(
-        workspace.grid, title, paint, workspace.robot, most=MOST_PLANES, parts=parts
+    several = "some of the kinds" if len(workspace.holds) > 1 else None
+    colors = {OUTSIDE: "outside", SOME: several, INSIDE: "inside"}
+    return draw_regions(
+        workspace.grid, _title(workspace, None), parts, colors, workspace.robot, most=MOST_PLANES
     )
-    labels = {OUTSIDE: "outside", SOME: "some of the kinds", INSIDE: "inside"}
-    if len(workspace.holds) == 1:
-        del labels[SOME]
-    patches = [Patch(facecolor=color, label=label) for color, label in labels.items()]
-    panels.figure.legend(
-        handles=[*patches, *panels.handles], loc="outside lower center", ncols=3, title=CELLS,
-        title_fontsize=10,
-    )  # fmt: skip
-    return panels.figure
 
 
 def _measure_figure(workspace: Workspace, measure: str) -> Figure:
     inside = workspace.inside()
     # With no pose inside there is nothing else to see; the title says so.
-    values = _least(workspace.values[measure], inside if inside.any() else np.ones_like(inside))
+    counted = (inside if inside.any() else True) & np.isfinite(workspace.values[measure])
+    values = np.min(np.where(counted, workspace.values[measure], np.inf), axis=0)
+    values = np.where(np.isfinite(values), values, np.nan)
     finite = values[np.isfinite(values)]
     limits = (float(np.min(finite)), float(np.max(finite))) if len(finite) else (0.0, 1.0)
     # A plane without a number would be an empty panel.
     colors = colormaps["viridis"].with_extremes(bad=OUTSIDE)
     points = [workspace.grid.axes[k] for k in plane_axes(workspace.grid.shape[1:])[1:]]
-    mesh = []
+    meshes = []
 
     def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
-        shown = plane(values)
-        mesh.append(axes.pcolormesh(*edges, shown, cmap=colors, vmin=limits[0], vmax=limits[1]))
-        if min(shown.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
-            _contours(axes, points, shown, limits)
+        cells = plane(values)
+        meshes.append(axes.pcolormesh(*edges, cells, cmap=colors, vmin=limits[0], vmax=limits[1]))
+        if min(cells.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
+            _contours(axes, points, cells, limits)
 
     panels = draw_planes(
         workspace.grid, _title(workspace, measure), paint, workspace.robot, most=MOST_PLANES
     )
     about = MEASURES[measure]
-    panels.figure.colorbar(mesh[-1], ax=panels.axes, label=f"{about.title} [{about.unit}]")
+    panels.figure.colorbar(meshes[-1], ax=panels.axes, label=f"{about.title} [{about.unit}]")
     handles: list[Artist] = [*panels.handles]
-    if np.any(np.isnan(panels.shown(values))):
+    if np.any(np.isnan(np.take(values, panels.chosen, panels.normal))):
         words = "outside" if inside.any() else "no number"
         handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
     if handles:
@@ -144,17 +138,27 @@ def breaks_figure(workspace: Workspace) -> Figure:
     Args:
         workspace: A result with the kind `dynamic-single-failure`.
     """
-    shape = workspace.grid.shape[1:]
+    about, turns = workspace.arguments["breaks"], len(workspace.grid.angles)
     arrays = [workspace.holds[SURVIVES], workspace.values[WORST], workspace.values[BEST]]
+    cell = 72.0 * 3.6 / max(workspace.grid.shape[1:])  # side of a cell [pt], about
 
     def paint(axes: Axes, edges: list[Array], plane: Callable[[Array], Array]) -> None:
-        smallest = 72.0 * 3.6 / max(shape)  # side of a cell [pt], about
-        _draw_breaks(axes, edges, [plane(array[0]) for array in arrays], smallest)
+        for j, i in np.ndindex(len(edges[1]) - 1, len(edges[0]) - 1):
+            sides = edges[0][i : i + 2], edges[1][j : j + 2]
+            numbers = [float(plane(array[0])[j, i]) for array in arrays]
+            _draw_break(axes, sides, numbers, cell)
+        axes.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
 
+    speed = float(np.linalg.norm(about["moving_m_s"]))
+    title = (
+        f"{workspace.arguments['robot']}, {workspace.geometry}: any one cable breaks "
+        + ("at rest" if speed == 0.0 else f"at {speed:.3g} m/s")
+        + (f", first of {turns} orientations" if turns > 1 else "")
+        + f"\nsurvived at {np.mean(workspace.holds[SURVIVES]):.0%} of the poses"
+    )
     panels = draw_planes(
-        workspace.grid, _breaks_title(workspace), paint, most=BREAK_PLANES, columns=BREAK_COLUMNS,
-        width=3.6,
-    )  # fmt: skip
+        workspace.grid, title, paint, most=BREAK_PLANES, columns=BREAK_COLUMNS, width=3.6
+    )
     handles: list[Patch | Line2D] = [
         Patch(facecolor=color, edgecolor="black", hatch=hatch, label=label)
         for color, (hatch, label) in LOOKS.items()
@@ -162,7 +166,7 @@ def breaks_figure(workspace: Workspace) -> Figure:
     handles += [
         Line2D([], [], color="black", marker=marker, linestyle="none", markerfacecolor="white",
                label=f"best: {name}")
-        for name, marker in zip(workspace.arguments["breaks"]["reactions"], MARKERS, strict=False)
+        for name, marker in zip(about["reactions"], MARKERS, strict=False)
     ]  # fmt: skip
     panels.figure.legend(
         handles=handles, loc="outside lower center", ncols=3, title_fontsize=10,
@@ -171,48 +175,30 @@ def breaks_figure(workspace: Workspace) -> Figure:
     return panels.figure
 
 
-def _draw_breaks(axes: Axes, edges: list[Array], planes: list[np.ndarray], smallest: float) -> None:
-    """Cells of a plane: verdicts, numbers of cables and of reactions, shape (nv, nu) each."""
-    survives, worst, best = planes
-    across, up = edges
-    for j, i in np.ndindex(*survives.shape):
-        low = float(across[i]), float(up[j])
-        high = float(across[i + 1]), float(up[j + 1])
-        held = bool(np.isfinite(worst[j, i]))
-        color = KEPT if survives[j, i] else LOST if held else UNHELD
-        axes.add_patch(
-            Rectangle(
-                low, high[0] - low[0], high[1] - low[1], facecolor=color, edgecolor="0.4",
-                linewidth=0.5, hatch=LOOKS[color][0], hatch_linewidth=0.4,
-            )
-        )  # fmt: skip
-        if not held:
-            continue
-        x, y = 0.5 * (low[0] + high[0]), low[1] + 0.68 * (high[1] - low[1])
+def _draw_break(
+    axes: Axes, sides: tuple[Array, Array], numbers: Sequence[float], size: float
+) -> None:
+    """A cell of so many points: verdict, number of the worst cable and of the best reaction."""
+    (left, right), (low, high) = sides
+    survives, worst, best = numbers
+    color = KEPT if survives else LOST if np.isfinite(worst) else UNHELD
+    axes.add_patch(
+        Rectangle(
+            (left, low), right - left, high - low, facecolor=color, edgecolor="0.4", linewidth=0.5,
+            hatch=LOOKS[color][0], hatch_linewidth=0.4,
+        )
+    )  # fmt: skip
+    if np.isfinite(worst):
+        x = 0.5 * (left + right)
         axes.text(
-            x, y, f"{int(worst[j, i])}", ha="center", va="center",
-            fontsize=float(np.clip(0.42 * smallest, 4.0, 12.0)),
+            x, low + 0.68 * (high - low), f"{int(worst)}", ha="center", va="center",
+            fontsize=float(np.clip(0.42 * size, 4.0, 12.0)),
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
         )  # fmt: skip
         axes.plot(
-            [x], [low[1] + 0.28 * (high[1] - low[1])], color="black", markerfacecolor="white",
-            marker=MARKERS[int(best[j, i]) - 1], markersize=float(np.clip(0.26 * smallest, 2, 8)),
+            [x], [low + 0.28 * (high - low)], color="black", markerfacecolor="white",
+            marker=MARKERS[int(best) - 1], markersize=float(np.clip(0.26 * size, 2, 8)),
         )  # fmt: skip
-    axes.set(xlim=across[[0, -1]], ylim=up[[0, -1]])
-
-
-def _breaks_title(workspace: Workspace) -> str:
-    about = workspace.arguments["breaks"]
-    speed = float(np.linalg.norm(about["moving_m_s"]))
-    turns = len(workspace.grid.angles)
-    words = "at rest" if speed == 0.0 else f"at {speed:.3g} m/s"
-    share = float(np.mean(workspace.holds[SURVIVES]))
-    several = f", first of {turns} orientations" if turns > 1 else ""
-    geometry = workspace.geometry
-    return (
-        f"{workspace.arguments['robot']}, {geometry}: any one cable breaks {words}{several}\n"
-        f"survived at {share:.0%} of the poses"
-    )
 
 
 def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
@@ -227,9 +213,8 @@ def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
     figure, axes = new_figure(
         1, 1, (7.0, 4.6), "\n".join(words) + f"\n{boxes.open:.2%} of the box open"
     )
-    names = ("proven inside", "proven outside", "open")
-    for number, (name, share) in enumerate(zip(names, boxes.curve[:, 1:].T, strict=True)):
-        look = nth_look(number)
+    for number, (name, _, _) in enumerate(PROVEN.values()):
+        look, share = nth_look(number), boxes.curve[:, number + 1]
         shown = share > 0.0  # on a logarithmic axis
         axes.plot(
             boxes.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
@@ -250,8 +235,8 @@ def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
         robot: Name of the robot.
         kinds: What was proven.
     """
-    low = np.min(boxes.poses - boxes.halves, axis=0)
-    high = np.max(boxes.poses + boxes.halves, axis=0)
+    lower, upper = boxes.poses - boxes.halves, boxes.poses + boxes.halves
+    low, high = np.min(lower, axis=0), np.max(upper, axis=0)
     middle = 0.5 * (low + high)
     wide = [k for k in range(3) if low[k] < high[k]]
     planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
@@ -265,33 +250,25 @@ def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
         hit = np.all(np.abs(boxes.poses - at)[:, others] <= boxes.halves[:, others] + 1e-12, axis=1)
         for verdict, (_, color, hatch) in PROVEN.items():
             numbers = np.flatnonzero(hit & (boxes.verdicts == verdict))
-            corners = (boxes.poses - boxes.halves)[numbers][:, (u, v)]
-            sizes = 2.0 * boxes.halves[numbers][:, (u, v)]
-            cells = corners[:, np.newaxis] + sizes[:, np.newaxis] * SQUARE
-            axes.add_collection(
-                PolyCollection(
-                    list(cells), facecolor=color, edgecolor="#555555", linewidth=0.1, hatch=hatch
-                )
-            )
+            sizes = 2.0 * boxes.halves[numbers][:, np.newaxis, (u, v)]
+            cells = lower[numbers][:, np.newaxis, (u, v)] + sizes * CORNERS[:4]
+            look: Any = {
+                "facecolor": color,
+                "edgecolor": "#555555",
+                "linewidth": 0.1,
+                "hatch": hatch,
+            }
+            axes.add_collection(PolyCollection(list(cells), **look))
         axes.set(xlim=(low[u], high[u]), ylim=(low[v], high[v]), aspect="equal")
         axes.set(xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
         axes.grid(False)
         axes.set_title(f"{'xyz'[normal]} = {middle[normal]:.3g} m", fontsize=11)
-    figure.legend(
-        handles=[
-            Patch(facecolor=color, edgecolor="#555555", hatch=hatch, label=label)
-            for label, color, hatch in PROVEN.values()
-        ],
-        loc="outside lower center",
-        ncols=3,
-    )
+    handles = [
+        Patch(facecolor=color, edgecolor="#555555", hatch=hatch, label=label)
+        for label, color, hatch in PROVEN.values()
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
-
-
-def _least(values: Array, inside: np.ndarray) -> Array:
-    """Least value over the orientations where all holds; NaN where none does."""
-    least = np.min(np.where(inside & np.isfinite(values), values, np.inf), axis=0)
-    return np.where(np.isfinite(least), least, np.nan)
 
 
 def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:

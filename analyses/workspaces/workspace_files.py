@@ -5,6 +5,7 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -133,9 +134,9 @@ def load_wrench_set(path: Path) -> SpatialSet:
     """
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of a set of wrenches")
-    found = load_typed(WrenchSetFile, path)
+    content = load_typed(WrenchSetFile, path)
     try:
-        wrenches = SpatialSet(found.vertices, found.box, found.ellipsoid)
+        wrenches = SpatialSet(content.vertices, content.box, content.ellipsoid)
     except WrenchSetError as problem:
         raise WrenchSetError(f"{path}: {problem}") from problem
     if wrenches.is_zero():
@@ -170,89 +171,71 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
     """
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
-    found = load_typed(ObstacleFile, path)
-    if not any((found.boxes, found.spheres, found.capsules, found.meshes, found.robots)):
+    content = load_typed(ObstacleFile, path)
+    if not any((content.boxes, content.spheres, content.capsules, content.meshes, content.robots)):
         raise DataFileError(
             f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes, robots"
         )
     boxes: list[np.ndarray] = []
     solids: list[ConvexShape] = []
     moving: list[MovingObstacle] = []
-    for k, box in enumerate(found.boxes):
+
+    def add(key: str, shape: ConvexShape, X_WS: RigidTransform, motion: Any) -> None:
+        """A shape in its frame S, which rests or moves."""
+        if motion is None:
+            solids.append(shape.moved(X_WS))
+            return
+        for problem in motion_problems(X_WS, motion, f"{key}.motion"):
+            raise DataFileError(f"{path}: {problem}")
+        moving.append(MovingShape(shape, body_motion(X_WS, motion), key))
+
+    for k, box in enumerate(content.boxes):
+        X_WS = box.pose.transform()
         if box.motion is None:
-            X = box.pose.transform()
-            boxes.append(box_row(X.translation(), box.size, X.rotation().matrix()))
+            boxes.append(box_row(X_WS.translation(), box.size, X_WS.rotation().matrix()))
         else:
             shape = ConvexShape.box_at(np.zeros(3), box.size, name=f"box {k + 1}")
-            moving.append(_moving(path, f"boxes[{k}]", shape, box.pose.transform(), box.motion))
-    for k, ball in enumerate(found.spheres):
-        name = f"sphere {k + 1}"
-        if ball.motion is None:
-            solids.append(ConvexShape.sphere(ball.position, ball.radius, name))
-        else:
-            shape, start = ConvexShape.sphere(np.zeros(3), ball.radius, name), ball.position
-            X = RigidTransform(start)
-            moving.append(_moving(path, f"spheres[{k}]", shape, X, ball.motion))
-    for k, line in enumerate(found.capsules):
+            add(f"boxes[{k}]", shape, X_WS, box.motion)
+    for k, ball in enumerate(content.spheres):
+        shape = ConvexShape.sphere(np.zeros(3), ball.radius, f"sphere {k + 1}")
+        add(f"spheres[{k}]", shape, RigidTransform(ball.position), ball.motion)
+    for k, line in enumerate(content.capsules):
         name, half = f"capsule {k + 1}", 0.5 * (line.end - line.start)
-        if line.motion is None:
+        if line.motion is None:  # its ends stay as they are, to the last digit
             solids.append(ConvexShape.capsule(line.start, line.end, line.radius, name))
         else:
             shape = ConvexShape.capsule(-half, half, line.radius, name)
-            X = RigidTransform(line.start + half)
-            moving.append(_moving(path, f"capsules[{k}]", shape, X, line.motion))
-    for k, one in enumerate(found.meshes):
+            add(f"capsules[{k}]", shape, RigidTransform(line.start + half), line.motion)
+    for k, mesh in enumerate(content.meshes):
         try:
-            vertices = one.scale * mesh_vertices(path.parent / one.file)
-            shape = ConvexShape.mesh(vertices, name=one.file)
+            vertices = mesh.scale * mesh_vertices(path.parent / mesh.file)
+            shape = ConvexShape.mesh(vertices, name=mesh.file)
         except CableGeometryError as problem:
             raise DataFileError(f"{path}: meshes[{k}].file: {problem}") from problem
-        if one.motion is None:
-            solids.append(shape.moved(one.pose.transform()))
-        else:
-            X = one.pose.transform()
-            moving.append(_moving(path, f"meshes[{k}]", shape, X, one.motion))
-    moving += [_robot(path, f"robots[{k}]", one) for k, one in enumerate(found.robots)]
+        add(f"meshes[{k}]", shape, mesh.pose.transform(), mesh.motion)
+    moving += [_robot(path, f"robots[{k}]", other) for k, other in enumerate(content.robots)]
     resting = Obstacles(np.array(boxes, float).reshape(-1, BOX_COLUMNS), tuple(solids))
     return resting, tuple(moving)
 
 
-def _moving(
-    path: Path, key: str, shape: ConvexShape, start: RigidTransform, motion: ObstacleMotion
-) -> MovingShape:
-    """A shape with its motion.
-
-    Raises:
-        DataFileError: The motion is not accepted.
-    """
-    for problem in motion_problems(start, motion, f"{key}.motion"):
-        raise DataFileError(f"{path}: {problem}")
-    return MovingShape(shape, body_motion(start, motion), key)
-
-
-def _robot(path: Path, key: str, one: OtherRobot) -> MovingRobot:
-    """Another robot.
-
-    Raises:
-        DataFileError: The robot or its plan cannot be read.
-    """
-    beside = path.parent / one.robot
+def _robot(path: Path, key: str, other: OtherRobot) -> MovingRobot:
+    """Another robot, which moves as its plan says, or rests at home."""
+    beside = path.parent / other.robot
     try:
-        robot = load_robot(str(beside) if beside.exists() else one.robot)
+        robot = load_robot(str(beside) if beside.exists() else other.robot)
     except CdprError as problem:
         raise DataFileError(f"{path}: {key}.robot: {problem}") from problem
-    if one.plan is None:
+    if other.plan is None:
         row = np.zeros((2, MOTION_SIZE))
         row[:, :7] = pose_row(robot.home.transform())
         motion = sampled_motion(np.array([0.0, 1e-3]), row)
     else:
-        table = path.parent / one.plan
-        if table.is_dir():
-            table = table / "motion.csv"
+        table = path.parent / other.plan
         try:
-            motion = read_motion(table, one.later)
+            motion = read_motion(table / "motion.csv" if table.is_dir() else table, other.later)
         except TrajectoryError as problem:
             raise DataFileError(f"{path}: {key}.plan: {problem}") from problem
-    around = interference_bodies(robot, pulleys=True)
-    planned = PlannedMotion(motion, one.pose.transform())
-    return MovingRobot(around, planned, f"{key} {robot.name}", one.beams)
+    planned = PlannedMotion(motion, other.pose.transform())
+    return MovingRobot(
+        interference_bodies(robot, pulleys=True), planned, f"{key} {robot.name}", other.beams
+    )

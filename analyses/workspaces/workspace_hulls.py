@@ -18,11 +18,9 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.workspaces.hull import FIRST_STEPS, WorkspaceHull, workspace_hull
 
 HULL_ARRAYS = "hull.npz"
-"""File of a hull's triangles."""
+"""File of a hull's triangles, with the arrays `NAMES`."""
 
 NAMES = ("center", "vertices", "faces", "cut", "tolerance")
-"""Arrays of that file."""
-
 
 REACH = 10
 """Where nothing bounds a hull, rays are followed to a box so many times as large as that of the
@@ -34,36 +32,18 @@ FRAME, BOX, NOTHING = "frame", "box", "nothing"
 
 @dataclass(frozen=True, eq=False)
 class HullBound:
-    """Where the rays of a hull end at the latest.
-
-    Attributes:
-        kind: `FRAME`, `BOX` or `NOTHING`.
-        why: In words.
-        lower: Lower corner of the box at which they end, shape (3,) [m].
-        upper: Upper corner, shape (3,) [m].
-    """
+    """What bounds the rays of a hull, why, and the box at which they end, shape (3,) each [m]."""
 
     kind: str
     why: str
     lower: Array
     upper: Array
 
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        corners = {"rays_end_at_lower_m": self.lower.tolist(), "at_upper_m": self.upper.tolist()}
-        return {"bounded_by": self.kind, "why": self.why, **corners}
-
 
 def hull_bound(
     robot: Robot, region: tuple[Array, Array] | None = None, unbounded: bool = False
 ) -> HullBound:
-    """What bounds the hull of a robot: a region that is given, else its frame, unless assumed.
-
-    Args:
-        robot: The robot.
-        region: Corners of a box, shape (3,) each [m]; None: none was given.
-        unbounded: Whether nothing shall bound it.
-    """
+    """What bounds the hull of a robot: a region, else its frame, unless that was assumed."""
     lower, upper = np.asarray(robot.frame.lower, float), np.asarray(robot.frame.upper, float)
     if region is not None:
         return HullBound(BOX, "as was asked for", *region)
@@ -96,12 +76,12 @@ def robot_hull(
         WorkspaceError: As `workspaces.hull.workspace_hull`, a kind is known at the poses of its
             grid only, or the robot does not move in space.
     """
-    for name in ("stable", SURVIVES):
-        if name in kinds:
+    for name in kinds:
+        if name in ("stable", SURVIVES):
             raise WorkspaceError(f"hull: found kinds {name}; accepted: kinds other than that")
     if robot.motion_type().num_moves < 3:
         raise WorkspaceError(
-            f"hull: found the planar {robot.name}; accepted: robots that move in space"
+            f"hull: found the planar robot {robot.name}; accepted: robots that move in space"
         )
     rows = np.zeros((1, 3)) if angles is None else angles
     turns = [rotation_from_angles(row).matrix() for row in rows]
@@ -126,21 +106,17 @@ def robot_hull(
 def hull_numbers(hull: WorkspaceHull, bound: HullBound) -> dict[str, Any]:
     """Volume, area, centroid and what bounded it for JSON."""
     return {
-        **bound.as_dict(),
-        "center_m": hull.center.tolist(),
-        "rays": len(hull.vertices),
-        "rays_to_the_bound": int(np.count_nonzero(hull.cut)),
-        "tolerance_m": hull.tolerance,
-        "volume_m3": hull.volume,
-        "area_m2": hull.area,
-        "centroid_m": hull.centroid.tolist(),
-    }
+        "bounded_by": bound.kind, "why": bound.why,
+        "rays_end_at_lower_m": bound.lower.tolist(), "at_upper_m": bound.upper.tolist(),
+        "center_m": hull.center.tolist(), "rays": len(hull.vertices),
+        "rays_to_the_bound": int(np.count_nonzero(hull.cut)), "tolerance_m": hull.tolerance,
+        "volume_m3": hull.volume, "area_m2": hull.area, "centroid_m": hull.centroid.tolist(),
+    }  # fmt: skip
 
 
 def save_hull(hull: WorkspaceHull, folder: Folder) -> None:
     """Writes `HULL_ARRAYS`."""
-    arrays = {name: np.asarray(getattr(hull, name)) for name in NAMES}
-    folder.write_arrays(HULL_ARRAYS, arrays)
+    folder.write_arrays(HULL_ARRAYS, {name: np.asarray(getattr(hull, name)) for name in NAMES})
 
 
 def load_hull(folder: Path) -> WorkspaceHull:

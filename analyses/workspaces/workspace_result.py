@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder
-from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.box_certificates import (
     BoxSearch,
-    RefinedBoxes,
     agreement_numbers,
     box_numbers,
     save_boxes,
@@ -38,7 +36,6 @@ from cdpr_drake.analyses.workspaces.grid_runs import (
     grid_words,
     load_grid,
     region_numbers,
-    save_grid,
 )
 from cdpr_drake.analyses.workspaces.workspace_hulls import (
     NOTHING,
@@ -61,8 +58,10 @@ if TYPE_CHECKING:
 CONTRADICTION = 1
 """Exit code if a proof contradicts the grid or the hull."""
 
-BOUNDS = {"frame": "the frame", "box": "a box", "nothing": "nothing"}
-ENDS = {"frame": " there", "box": " there", "nothing": " at ten times the frame"}
+BOUNDS = {
+    "frame": ("the frame", "there"), "box": ("a box", "there"),
+    "nothing": ("nothing", "at ten times the frame"),
+}  # fmt: skip
 """What bounds a hull, and where its rays end at the latest, in words."""
 
 COMPARED = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
@@ -81,7 +80,7 @@ class Workspace(GridResult):
         boxes: Boxes proven inside or outside.
         search: What was cut into boxes.
         region: Lower and upper corner of the box given instead of the frame, shape (3,) each [m].
-        refined: How boxes were cut further along a way.
+        refined: How boxes were cut further along a way, as `refined_boxes` says.
     """
 
     holds: dict[str, np.ndarray]
@@ -91,7 +90,7 @@ class Workspace(GridResult):
     boxes: CertifiedBoxes | None = None
     search: BoxSearch | None = None
     region: tuple[Array, Array] | None = None
-    refined: RefinedBoxes | None = None
+    refined: dict[str, Any] | None = None
 
     @property
     def exit_code(self) -> int:
@@ -161,8 +160,10 @@ class Workspace(GridResult):
         if self.boxes is not None and self.search is not None:
             result["certified"] = box_numbers(self.boxes, self.search)
             if self.refined is not None:
-                result["refined"] = self.refined.as_dict()
-            result["agreement"] = agreement_numbers(self.agreement)
+                result["refined"] = self.refined
+            result["agreement"] = {
+                name: agreement_numbers(part) for name, part in self.agreement.items()
+            }
         return result
 
     def _regions(self) -> list[str]:
@@ -249,33 +250,33 @@ class Workspace(GridResult):
         if self.hull is None or self.bound is None:
             return []
         cut = int(np.count_nonzero(self.hull.cut))
+        bounded, ends = BOUNDS[self.bound.kind]
         return [
             f"hull: {self.hull.volume:.4g} m^3, {self.hull.area:.4g} m^2, "
-            f"{len(self.hull.vertices)} rays, bounded by {BOUNDS[self.bound.kind]}, "
-            f"{self.bound.why}; {cut} of them were cut{ENDS[self.bound.kind]}"
+            f"{len(self.hull.vertices)} rays, bounded by {bounded}, {self.bound.why}; {cut} of "
+            f"them were cut {ends}"
         ]
 
     def _box_lines(self) -> list[str]:
         if self.boxes is None or self.search is None:
             return []
-        boxes = self.boxes
+        about = box_numbers(self.boxes, self.search)
         lines = [
-            f"certified, cables {self.search.words()['cables']}: all poses in {boxes.inside:.2%} "
-            f"of the box inside, in {boxes.outside:.2%} outside, {boxes.open:.2%} open; "
-            f"{int(boxes.curve[-1, 0])} boxes"
+            f"certified, cables {about['cables']}: all poses in {about['inside_share']:.2%} of the "
+            f"box inside, in {about['outside_share']:.2%} outside, {about['open_share']:.2%} open; "
+            f"{about['boxes_judged']} boxes"
         ]
         if (finer := self.refined) is not None:
             lines.append(
-                f"boxes within {finer.tube.reach[0]:g} m of the way: {finer.before:.2%} of them "
-                f"were open, {finer.after:.2%} are; {finer.judged} boxes"
+                f"boxes within {finer['reach_m']:g} m of the way: "
+                f"{finer['open_share_before']:.2%} of them were open, "
+                f"{finer['open_share_after']:.2%} are; {finer['boxes_judged']} boxes"
             )
-        for name, part in self.agreement.items():
-            lines.append(
-                f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at "
-                f"{part.poses} of them; {part.inside} in boxes proven inside, {part.outside} "
-                "outside"
-            )
-        return lines
+        return lines + [
+            f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at {part.poses} of "
+            f"them; {part.inside} in boxes proven inside, {part.outside} outside"
+            for name, part in self.agreement.items()
+        ]
 
     def notes(self) -> list[str]:
         """What may be taken for something else, and proofs that are wrong."""
@@ -319,23 +320,13 @@ class Workspace(GridResult):
         parts = {**self.holds, **self.values}
         return {**self.grid.columns(), **{name: part.reshape(-1) for name, part in parts.items()}}
 
-    def save(self, folder: Folder) -> None:
-        """Writes `workspace.npz`."""
-        arrays = {
-            **{f"kind/{name}": part for name, part in self.holds.items()},
-            **{f"measure/{name}": part for name, part in self.values.items()},
-        }
-        about = {"arguments": self.arguments, "versions": self.versions}
-        save_grid(folder, about, self.grid, arrays)
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Names are kind/NAME and measure/NAME."""
+        kinds = {f"kind/{name}": part for name, part in self.holds.items()}
+        return kinds | {f"measure/{name}": part for name, part in self.values.items()}
 
-    def write(
-        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS, follow: Follow = NOBODY
-    ) -> dict[str, str]:
-        """Writes hull, boxes, numbers, figures and the page; the grid's arrays by `save`.
-
-        Returns:
-            Why figures were not written, by file.
-        """
+    def write(self, folder: Folder, formats: Sequence[str], follow: Follow) -> dict[str, str]:
+        """Writes hull and boxes, too."""
         if self.hull is not None:
             save_hull(self.hull, folder)
         if self.boxes is not None:
@@ -360,7 +351,4 @@ def load_workspace(path: Path | str) -> Workspace:
     for key, array in arrays.items():
         group, _, name = key.partition("/")
         groups[group][name] = array
-    return Workspace(
-        arguments=about["arguments"], grid=grid, versions=about["versions"],
-        holds=groups["kind"], values=groups["measure"],
-    )  # fmt: skip
+    return Workspace(**about, grid=grid, holds=groups["kind"], values=groups["measure"])

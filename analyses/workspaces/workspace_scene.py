@@ -8,9 +8,10 @@ it under the limits, mass and wrench of the workspace; if none do, its cables ar
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.colors import to_hex
 from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
@@ -67,22 +68,14 @@ Mesh = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of what is empty."""
 
 
-class Solid(NamedTuple):
-    """A workspace as it is drawn, with its path below "workspaces"."""
-
-    path: str
-    mesh: Mesh
-    color: Rgba
-
-
 def workspace_page(workspace: Workspace, robot: Robot) -> tuple[Pictures, str]:
     """What writes the page of a workspace, and what should be known of it."""
-    solids = [Solid(*parts) for parts in workspace_solids(workspace)]
+    solids = workspace_solids(workspace)
     if workspace.hull is not None:
-        solids.append(Solid("hull", *hull_solid(workspace.hull)))
+        solids.append(("hull", *hull_solid(workspace.hull)))
     if workspace.boxes is not None:
         solids += [
-            Solid(f"boxes/{name}, {words}", mesh, color)
+            (f"boxes/{name}, {words}", mesh, color)
             for name, words, mesh, color in box_solids(workspace.boxes)
         ]
     title = f"{workspace.arguments['robot']}: workspaces, {workspace.geometry}"
@@ -94,7 +87,7 @@ def workspace_page(workspace: Workspace, robot: Robot) -> tuple[Pictures, str]:
 def stability_page(stability: Stability, robot: Robot) -> tuple[Pictures, str]:
     """What writes the page of stability workspaces, and what should be known of it."""
     solids = [
-        Solid(f"{name}/{kind}" if kind != "S" else "S", mesh, color)
+        (f"{name}/{kind}" if kind != "S" else "S", mesh, color)
         for name, kind, mesh, color in stability_solids(stability)
     ]
     title = f"{robot.name}: stability of the servo, {stability.geometry}"
@@ -104,29 +97,21 @@ def stability_page(stability: Stability, robot: Robot) -> tuple[Pictures, str]:
 def workspace_solids(workspace: Workspace) -> list[tuple[str, Mesh, Rgba]]:
     """What all kinds have in common, if there are several, and each kind."""
     names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
+    colors = [*COLORS, *[COLORS[-1]] * len(names)]
     return [
-        (
-            name,
-            triangles(surface_quads(workspace.places(name), workspace.grid.axes)),
-            COLORS[min(number, len(COLORS) - 1)],
-        )
-        for number, name in enumerate(names)
+        (name, triangles(surface_quads(workspace.places(name), workspace.grid.axes)), color)
+        for name, color in zip(names, colors, strict=False)
     ]
 
 
 def stability_solids(stability: Stability) -> list[tuple[str, str, Mesh, Rgba]]:
     """Bounds and kind of each workspace, and its mesh; S once, for the first bounds."""
     return [
-        (
-            name,
-            kind,
-            triangles(surface_quads(stability.places(kind, name), stability.grid.axes)),
-            color,
-        )
-        for number, name in enumerate(stability.names)
-        for kind, color in STABILITY_COLORS.items()
-        if kind != "S" or number == 0  # the same for all bounds
-    ]
+        (name, kind, triangles(surface_quads(stability.places(kind, name), stability.grid.axes)),
+         color)
+        for name in stability.names for kind, color in STABILITY_COLORS.items()
+        if kind != "S" or name == stability.names[0]
+    ]  # fmt: skip
 
 
 def hull_solid(hull: WorkspaceHull) -> tuple[Mesh, Rgba]:
@@ -162,7 +147,7 @@ def _cuboids(middles: Array, halves: Array) -> Mesh:
 
 
 def _page(
-    robot: Robot, statics: Mapping[str, Any], title: str, solids: Sequence[Solid]
+    robot: Robot, statics: Mapping[str, Any], title: str, solids: Sequence[tuple[str, Mesh, Rgba]]
 ) -> tuple[Pictures, str]:
     """The page, with the first solid visible; words if cables are grey, or if there is no page."""
     tensions, problem = _home_tensions(statics, robot)
@@ -174,19 +159,15 @@ def _page(
     except CdprError as undrawn:
         return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {undrawn}"
     picture.title = title
-    for number, solid in enumerate(solids):
-        if len(solid.mesh[1]):
-            path = f"workspaces/{solid.path}"
-            add_solid(picture.meshcat, path, *solid.mesh, solid.color, visible=number == 0)
-            if number == 0:
-                picture.explain(f"workspace {solid.path}", Look(_hexadecimal(solid.color)))
+    for number, (path, mesh, color) in enumerate(solids):
+        if len(mesh[1]):
+            first = number == 0
+            add_solid(picture.meshcat, f"workspaces/{path}", *mesh, color, visible=first)
+            if first:
+                hexadecimal = to_hex((color.r(), color.g(), color.b()))
+                picture.explain(f"workspace {path}", Look(hexadecimal))
     note = f"{PAGE} shows the robot at home without tensions: {problem}" if problem else ""
     return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, note
-
-
-def _hexadecimal(color: Rgba) -> str:
-    parts = (color.r(), color.g(), color.b())
-    return "#" + "".join(f"{round(255 * part):02x}" for part in parts)
 
 
 def _home_tensions(statics: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:

@@ -17,6 +17,7 @@ from cdpr_drake.analyses.workspaces.box_certificates import (
 from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.convex_shapes import ConvexShape
+from cdpr_drake.workspaces import box_judges
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask, judge_all
 from cdpr_drake.workspaces.box_refinement import PathTube, refine
@@ -300,14 +301,23 @@ def test_boxes_of_several_kinds_are_those_of_each():
     assert np.mean(least[boxes.verdicts == INSIDE] == INSIDE) > 0.9
 
 
-def test_a_search_of_several_kinds_goes_on_where_it_was_stopped(tmp_path):
+@pytest.mark.parametrize("kinds", [["static"], ["static", "collision-free"]])
+def test_a_search_goes_on_where_it_was_stopped_and_judges_no_box_again(
+    tmp_path, monkeypatch, kinds
+):
     robot, _ = robot_case("planar")
-    kinds = ["static", "collision-free"]
     search = box_search(robot, pose_conditions(robot), kinds, np.zeros((1, 3)))
-    whole = certified_boxes(search, 2500)
+    judged, judge = [], box_judges._judge
+    monkeypatch.setattr(
+        box_judges, "_judge",
+        lambda task, *boxes: judged.append(len(boxes[0])) or judge(task, *boxes),
+    )  # fmt: skip
+    whole, once = certified_boxes(search, 2500), sum(judged)
     with Folder(tmp_path, {}) as folder:
         certified_boxes(search, 1000, folder)
+        before = sum(judged)
         same(whole, certified_boxes(search, 2500, folder))
+    assert sum(judged) - before < once
 
 
 def test_boxes_that_are_read_again_are_refined_as_they_were(tmp_path):

@@ -10,12 +10,10 @@ from pydrake.math import RigidTransform
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
 from cdpr_drake.analyses.workspaces.workspace_figures import breaks_figure, planes_figure
-from cdpr_drake.cli.app import main
-from cdpr_drake.errors import StoppedError, WorkspaceError
+from cdpr_drake.errors import StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.workspaces.pose_grid import grid_by_count
-from tests.messages import printed
 
 AFTER, REACTIONS = 0.2, ["stop", "redistribute"]
 GRID = grid_by_count(np.array([0.0, 0.0, 0.35]), np.array([0.1, 0.0, 0.35]), (2, 1, 1))
@@ -74,23 +72,6 @@ def test_it_is_written_and_drawn(found, folder):
     assert numbers == [f"{int(n)}" for n in found.values["worst-cable"].ravel()]
 
 
-@pytest.mark.parametrize(
-    ("robot", "asked", "words"),
-    [
-        ("acrobot_large", {"reactions": ["pray"]}, "reactions 'pray' is unknown"),
-        ("acrobot_large", {"moving": [1.0, 0.0]}, "moving: found .*; accepted: three finite"),
-        ("acrobot_large", {"mass": 2.0}, "mass: found with kinds dynamic-single-failure"),
-        ("acrobot_large", {"scenario": "acrobot_pbvs"}, "winches.mode: found velocity"),
-        ("acrobot_large", {"hull": [0.0, 0.0, 0.3]}, "hull: found kinds dynamic-single-failure"),
-        ("acrobot_large", {"certify": True}, "certify: found kinds dynamic-single-failure"),
-        ("planar", {}, "kind dynamic-single-failure: found planar"),
-    ],
-)
-def test_what_is_refused(robot, asked, words):
-    with pytest.raises(WorkspaceError, match=words):
-        cdpr.compute_workspace(robot, "dynamic-single-failure", **asked)
-
-
 def test_excursions_are_drawn_where_no_pose_survives(found):
     kind = "dynamic-single-failure"
     nobody = replace(found, holds={kind: np.zeros_like(found.holds[kind])})
@@ -98,13 +79,3 @@ def test_excursions_are_drawn_where_no_pose_survives(found):
     shown = np.ravel(drawn.axes[0].collections[0].get_array())
     np.testing.assert_array_equal(shown, found.values["break-excursion"].ravel())
     assert "no pose inside" in drawn.get_suptitle()
-
-
-def test_options_that_only_it_takes_are_refused_without_it(capsys):
-    with pytest.raises(SystemExit) as end:
-        main(["workspace", "acrobot_large", "--moving", "0.1,0,0"])
-    assert end.value.code == 2
-    assert (
-        "--moving: found --kind static; accepted: dynamic-single-failure among them"
-        in printed(capsys).err
-    )

@@ -46,7 +46,6 @@ def workspaces(counts, stable=True, feasible=True, values=(), robot=None):
     return Stability(
         arguments=arguments,
         grid=grid,
-        names=names,
         stable=np.broadcast_to(stable, shape),
         margin=np.zeros(shape),
         feasible=np.broadcast_to(feasible, grid.shape),
@@ -184,7 +183,7 @@ def test_curves_of_two_bounds_have_colours_that_are_far_from_each_other():
               "r_bp=0.05": {"r_A": 0.005, "r_bp": 0.05}}  # fmt: skip
     stable = np.broadcast_to(True, (3, *made.grid.shape))
     made = replace(
-        made, arguments=made.arguments | {"bounds": bounds}, names=tuple(bounds), stable=stable,
+        made, arguments=made.arguments | {"bounds": bounds}, stable=stable,
         margin=np.zeros(stable.shape),
     )  # fmt: skip
     (axes,) = curves_figure(made).axes

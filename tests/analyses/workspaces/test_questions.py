@@ -119,6 +119,7 @@ def test_nothing_is_left_to_do_where_the_camera_has_the_desired_view(robot, name
         ("acrobot_large", "acrobot_eye_to_hand", "target.carrier platform; accepted: world"),
         ("acrobot_large", "caroca_pbvs", "outside the frame"),
         ("acrobot_large", "acrobot_pbv", "acrobot_pbvs"),
+        ("acrobot_large", "acrobot_pick_and_place", "accepted for workspaces: a visual servo"),
     ],
 )
 def test_what_the_criterion_is_not_about_is_refused(robot, name, words):

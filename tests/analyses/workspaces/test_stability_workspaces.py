@@ -8,6 +8,7 @@ import yaml
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import NOBODY
 from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.analyses.workspaces.servo_stability import (
     ServoView,
@@ -125,7 +126,7 @@ def test_curves_have_the_values_of_the_bounds(found):
 
 def test_figures_and_scene_are_written(found, tmp_path):
     with Folder(tmp_path / "w", {}) as folder:
-        assert not found.write(folder)
+        assert not found.written(folder, ("png",), NOBODY).failed
     paths = sorted(folder.path.glob("*.png"))
     assert [path.name for path in paths] == ["planes.png", "solids.png", "volumes.png"]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)
@@ -163,19 +164,11 @@ def test_the_target_may_be_a_real_one():
 
 
 @pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"limits": (-1.0, 60.0)}, ["-1", "0 <= lower"]),
-        ({"mass": -1.0}, ["weight"]),
-        ({"wrench": np.zeros(5)}, ["wrench", "6"]),
-    ],
+    ("changes", "words"), [({"mass": -1.0}, "weight"), ({"wrench": np.zeros(5)}, "wrench: .*6")]
 )
 def test_refuses_loads_that_make_no_sense(changes, words):
-    with pytest.raises(CdprError) as refused:
+    with pytest.raises(CdprError, match=words):
         static_case(load_robot("acrobot_large"), **changes)
-    for word in words:
-        assert word in str(refused.value)
-    assert "\n" not in str(refused.value)
 
 
 def test_too_few_cables_are_refused(tmp_path):
