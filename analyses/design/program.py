@@ -12,15 +12,16 @@ import numpy as np
 from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
-from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
+from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals, goal_signs
 from cdpr_drake.analyses.design.search import (
+    SLOPES,
     DesignSearch,
+    Slopes,
     evaluate_original,
     goal_context,
     scores_of,
     search_design,
 )
-from cdpr_drake.analyses.design.search_methods import SLOPES, Slopes
 from cdpr_drake.analyses.design.settings import DesignSettings
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.workspaces.conditions import KINDS
@@ -46,9 +47,6 @@ LOCAL = (
     "better one elsewhere"
 )
 
-Told = Callable[[Array], Array]
-"""Numbers of the program's design variables, shape (size,), to shape (r,)."""
-
 
 class DesignProgram(OwnTerms):
     """A robot that is better by the goals of a design, near the present one, with own terms.
@@ -59,7 +57,7 @@ class DesignProgram(OwnTerms):
     motor_torque [N m]. Costs count beside the goals' weighted sum with the sign changed, in which
     every goal is relative to the robot as it is.
 
-    A goal that is the least of smooth functions over the poses, of `search_methods.SLOPES`, enters
+    A goal that is the least of smooth functions over the poses, of `search.SLOPES`, enters
     as such, with exact slopes; others by differences. With nothing added `Solve` is
     `search_design`. With own terms SNOPT seeks from the present robot.
 
@@ -89,8 +87,8 @@ class DesignProgram(OwnTerms):
             CdprError: As `make_candidates` and `evaluate_original`; nothing may move; a goal is a
                 count; there is no such set.
         """
-        name = robot.name if isinstance(robot, Robot) else robot
         self.robot, self.settings, self.number = robot, settings, number
+        name = robot.name if isinstance(robot, Robot) else robot
         self.candidates = make_candidates(name, settings, source)
         if self.candidates.size == 0:
             raise DesignError("design: found nothing that may move; accepted: a reach above 0")
@@ -98,9 +96,9 @@ class DesignProgram(OwnTerms):
             raise DesignError(
                 f"number: found {number}; accepted: 0 to {len(self.candidates.cable_sets) - 1}"
             )
-        self._goals = tuple(goal.name for goal in settings.goals)
+        self._goals = settings.goal_names
         self._refuse_counts(self._goals)
-        self.judging = goal_context(robot, settings.poses, settings)
+        self.judging = goal_context(robot, settings)
         self._original = evaluate_original(self.candidates, self.judging, self._goals)
         self._goals_at: dict[bytes, dict[str, float]] = {}
         self._values = self._read()
@@ -109,7 +107,8 @@ class DesignProgram(OwnTerms):
         self._prog.AddBoundingBoxConstraint(0.0, 1.0, self._z)
         self._prog.SetInitialGuess(self._z, self._present())
         self._leasts: list[tuple[object, Slopes]] = []
-        for goal, weight in zip(self._goals, self._weights(), strict=True):
+        weights = scores_of(np.eye(len(self._goals)), self._original, settings)
+        for goal, weight in zip(self._goals, weights, strict=True):
             self._add_goal(goal, weight)
         self._seal()
 
@@ -181,14 +180,12 @@ class DesignProgram(OwnTerms):
             CdprError: As `search_design`; no design keeps the own constraints.
         """
         if not self.has_own_terms:
-            return search_design(self.robot, self.candidates, self.settings, follow=follow)
+            return search_design(self.candidates, self.settings, self.judging, follow=follow)
         start = np.zeros(self._prog.num_vars())
         places = self._prog.FindDecisionVariableIndices(self._z)
         start[places] = self._present()
         for least, slopes in self._leasts:
-            margins, _ = slopes(
-                self.candidates, self.number, self._shares(start[places]), self.judging
-            )
+            margins, _ = self._margins(slopes, start[places])
             start[self._prog.FindDecisionVariableIndex(least)] = float(np.min(margins))
         x, solver, said = self._solve_whole(start, "a design")
         designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
@@ -206,8 +203,8 @@ class DesignProgram(OwnTerms):
     def _add_goal(self, goal: str, weight: float) -> None:
         slopes = SLOPES.get(goal)
         if slopes is None:
-            sign = -1.0 if GOALS[goal].smaller else 1.0
-            made = _ByDifferences(lambda z: np.array([-weight * sign * self._goal(goal, z)]))
+            less = -weight * float(goal_signs([goal])[0])
+            made = _ByDifferences(lambda z: np.array([less * self._goal(goal, z)]))
             self._prog.AddCost(_CostOf(made), vars=self._z)
             return
         (least,) = self._prog.NewContinuousVariables(1, f"least {goal}")
@@ -220,7 +217,7 @@ class DesignProgram(OwnTerms):
         self._leasts.append((least, slopes))
 
     def _margins(self, slopes: Slopes, z: Array) -> tuple[Array, Array]:
-        values, by = slopes(self.candidates, self.number, self._shares(z), self.judging)
+        values, by = slopes(self.candidates, self.number, self.judging, self._shares(z))
         return values, by * self._share_slopes(z)
 
     def _goal(self, goal: str, z: Array) -> float:
@@ -232,13 +229,6 @@ class DesignProgram(OwnTerms):
         while len(self._goals_at) > MOST_KEPT:
             del self._goals_at[next(iter(self._goals_at))]
         return values[goal]
-
-    def _weights(self) -> Array:
-        """Of the goals, each over its size of the robot as it is, as `scores_of`."""
-        size = np.where(
-            np.isfinite(self._original) & (self._original != 0.0), np.abs(self._original), 1.0
-        )
-        return np.array([goal.weight for goal in self.settings.goals]) / size
 
     def _refuse_counts(self, goals: Sequence[str]) -> None:
         smooth = [name for name in GOALS if name not in STEPPED]
@@ -299,7 +289,7 @@ class DesignProgram(OwnTerms):
 class _ByDifferences(ProgramFunction):
     """Numbers of design variables, with derivatives by differences within their ranges."""
 
-    def __init__(self, function: Told) -> None:
+    def __init__(self, function: Callable[[Array], Array]) -> None:
         self._function = function
 
     def numbers(self, x: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,15 +25,10 @@ from cdpr_drake.analyses.frame.words import (
     OutFolder,
     RobotWord,
     Switch,
-    Word,
     one_of,
-    value_of,
-    with_word,
     words,
 )
-from cdpr_drake.analyses.frame.words import (
-    poses as parse_poses,
-)
+from cdpr_drake.analyses.frame.words import poses as parse_poses
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
@@ -286,21 +281,20 @@ class Reconfiguration(Result):
         folder.write_json(SUMMARY, self.as_dict())
 
 
-_POSES = words(
-    with_word(parse_poses), "poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them",
-    "POSES",
-)  # fmt: skip
-
-
-def _task(kind: Any, tokens: Sequence[Token]) -> Any:
+def _pose_words(kind: Any, tokens: Sequence[Token]) -> Any:
     """Poses behind --poses, a file behind --path."""
     if tokens[0].keyword == "--path":
         return Path(tokens[0].value)
     return _POSES.converter(kind, tokens)  # type: ignore[misc, operator]
 
 
+_POSES = words(
+    parse_poses, "poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them", "POSES"
+)
+
 PosesWord = Annotated[
-    Any, Parameter(name=("--poses", "--path"), converter=_task, n_tokens=1, metavar="POSES|FILE")
+    Any,
+    Parameter(name=("--poses", "--path"), converter=_pose_words, n_tokens=1, metavar="POSES|FILE"),
 ]
 
 
@@ -342,47 +336,66 @@ def reconfigure(
         CdprError: A file cannot be read, or the robot is not accepted.
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
-    loaded, groups = as_robot(robot, "reconfigure"), list[list[str]]()
+    if starts < 1:
+        raise PlanningError(f"starts: found {starts}; accepted: at least 1")
+    if not (around > 0.0 and turn >= 0.0 and boxes >= 1):
+        raise PlanningError(
+            f"around: found {around:g} m, {turn:g} deg, {boxes} boxes; accepted: above 0, at least "
+            "0, at least 1"
+        )
+    if goal not in RAIL_GOALS:
+        raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
+    before, groups = as_robot(robot, "reconfigure"), list[list[str]]()
     if rails is not None:
         of_file = isinstance(rails, str | Path)
         settings = load_rails(Path(rails)) if of_file else list(rails)
-        loaded = put_rails(loaded, settings, str(rails) if of_file else "rails")
+        before = put_rails(before, settings, str(rails) if of_file else "rails")
         groups = [list(rail.cables) for rail in settings]
         moved = {name for group in groups for name in group}
-        for cable in loaded.cables:  # rails that are given take the place of all of the robot's
+        for cable in before.cables:  # rails that are given take the place of all of the robot's
             if cable.rail is not None and cable.name not in moved:
                 cable.exit_point, cable.rail = cable.exit_point + cable.rail.shift(), None
-    X_WP = _task_poses(loaded, poses, samples)
-    wrenches = load_wrench_set(Path(resist)) if isinstance(resist, str | Path) else resist
+    X_WP = _task_poses(before, poses, samples)
+    required = load_wrench_set(Path(resist)) if isinstance(resist, str | Path) else resist
     arguments = {
-        "robot": loaded.name, "rails": str(rails), "poses": [pose_in_degrees(X) for X in X_WP],
+        "robot": before.name, "rails": str(rails), "poses": [pose_in_degrees(X) for X in X_WP],
         "resist": str(resist), "goal": goal, "limits": limits, "starts": starts,
         "around": [around, turn, boxes],
     }  # fmt: skip
-    name = f"rails/{loaded.name}"
+    name = f"rails/{before.name}"
     with results_folder(name, arguments, folder, overwrite, follow.results) as results:
+        track, names = rails_of(before, groups)
+        task = RailTask(static_case(before, limits, pulleys=False), track, X_WP, required)
         try:
-            solution = reconfigured(
-                loaded, X_WP, wrenches, groups, goal=goal, limits=limits, starts=starts,
-                around=(around, turn), boxes=boxes, say=follow.doing,
-            )  # fmt: skip
+            task.loads()
         except WrenchSetError as problem:
-            if wrenches is resist:
+            if required is resist:
                 raise
             raise WrenchSetError(f"{resist}: {problem}") from problem
+        follow.doing(f"Moving exit points of {before.name}")
+        solution = _best_coordinates(task, goal, starts)
+        after = _moved(before, names, solution.coordinates)
+        follow.doing("Proving what is around the poses")
+        case = static_case(after, limits, pulleys=False)
+        margins = [task.margins(at) for at in (track.at, solution.coordinates)]
+        result = Reconfiguration(
+            before=before, after=after, task=task, goal=goal, names=names, solution=solution,
+            margins=np.min(margins, axis=2), over_pulleys=_over_pulleys(task, after, limits),
+            tensions=np.max(task.largest_tensions(solution.coordinates), axis=1),
+            proofs=[_proof(case, X, required, (around, turn), boxes) for X in X_WP],
+            around=(around, turn), folder=None if results is None else results.path,
+        )  # fmt: skip
         if results is not None:
-            solution = replace(solution, folder=results.path)
-            written(solution, results, formats, follow)
-        return solution
+            written(result, results, formats, follow)
+        return result
 
 
 def _task_poses(robot: Robot, poses: Any, samples: int) -> list[RigidTransform]:
     """Poses themselves, or `samples` of a path from a file."""
-    if isinstance(poses, Word) or not isinstance(poses, Path | str):
-        result = [as_pose(robot, pose) for pose in value_of(poses)]
-        if not result:
+    if not isinstance(poses, Path | str):
+        if not len(poses):
             raise PlanningError("poses: found none; accepted: at least 1")
-        return result
+        return [as_pose(robot, pose) for pose in poses]
     if samples < 2:
         raise PlanningError(f"samples: found {samples}; accepted: at least 2")
     read = path_poses(robot, poses)
@@ -390,50 +403,8 @@ def _task_poses(robot: Robot, poses: Any, samples: int) -> list[RigidTransform]:
     return [path.pose(float(s)) for s in np.linspace(0.0, path.length, samples)]
 
 
-def reconfigured(
-    robot: Robot,
-    poses: Sequence[RigidTransform],
-    required: SpatialSet | None = None,
-    groups: Sequence[Sequence[str]] = (),
-    *,
-    goal: str = MARGIN,
-    limits: tuple[float, float] | None = None,
-    starts: int = STARTS,
-    around: tuple[float, float] = (AROUND, TURN),
-    boxes: int = BOXES,
-    say: Callable[[str], None] = lambda words: None,
-) -> Reconfiguration:
-    """Puts exit points of a robot along its rails for poses, and proves what is round these.
-
-    Args:
-        robot: The robot, with rails.
-        poses: X_WP, at least one [m].
-        required: Wrenches to resist at each; None: none beside the weight.
-        groups: Cables that move together.
-        goal: One of `RAIL_GOALS`.
-        limits: Smallest and largest tension [N]; None: the robot's.
-        starts: Of the program.
-        around: Half widths of the box of poses that is proven around each [m, deg].
-        boxes: Boxes that are judged, at most, for each pose.
-        say: Called with words for what is done now.
-
-    Raises:
-        PlanningError: No position of the rails does it; names pose and wrench. Or something is not
-            accepted.
-        CdprError: The robot cannot be asked.
-    """
-    if goal not in RAIL_GOALS:
-        raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
-    if starts < 1:
-        raise PlanningError(f"starts: found {starts}; accepted: at least 1")
-    if not (around[0] > 0.0 and around[1] >= 0.0 and boxes >= 1):
-        raise PlanningError(
-            f"around: found {around[0]:g} m, {around[1]:g} deg, {boxes} boxes; accepted: above 0, "
-            "at least 0, at least 1"
-        )
-    rails, names = rails_of(robot, groups)
-    task = RailTask(static_case(robot, limits, pulleys=False), rails, list(poses), required)
-    say(f"Moving exit points of {robot.name}")
+def _best_coordinates(task: RailTask, goal: str, starts: int) -> RailsSolution:
+    """Coordinates of the rails; refuses if no position of theirs does it."""
     program = ReconfigurationProgram(task)
     program.AddLargestMargin()
     solution = program.Solve(starts)
@@ -444,21 +415,11 @@ def reconfigured(
         program = ReconfigurationProgram(task)
         program.AddLeastLargestTension()
         solution = program.Solve(starts)
-        margins = task.margins(solution.coordinates)
     if not solution.success:
         raise PlanningError(
             f"rails: {solution.solver}: {solution.status}; accepted: other rails or poses"
         )
-    after = _moved(robot, names, solution.coordinates)
-    case = static_case(after, limits, pulleys=False)
-    say("Proving what is around the poses")
-    return Reconfiguration(
-        before=robot, after=after, task=task, goal=goal, names=names, solution=solution,
-        margins=np.array([np.min(task.margins(rails.at), axis=1), np.min(margins, axis=1)]),
-        over_pulleys=_over_pulleys(task, after, limits),
-        tensions=np.max(task.largest_tensions(solution.coordinates), axis=1),
-        proofs=[_proof(case, X, required, around, boxes) for X in task.poses], around=around,
-    )  # fmt: skip
+    return solution
 
 
 def _impossible(task: RailTask, margins: Array) -> str:
