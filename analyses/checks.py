@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.logs import ImportedLog, import_log
 from cdpr_drake.analyses.logs.log_formats import detect_log
@@ -75,10 +75,6 @@ class CheckedFiles(Result):
              "notes": list(file.notes)}
             for file in self.files
         ]  # fmt: skip
-
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
 
     def lines(self) -> list[str]:
         """Problems and notes."""

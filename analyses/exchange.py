@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cdpr_drake.analyses.frame.files import WrittenFiles, write_files
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import ModelWord, NewFolder, OutFolder, one_of
 from cdpr_drake.errors import RobotFileError
@@ -68,10 +68,6 @@ class ForeignModel(Result):
         numbers = self.model.as_dict()
         head = {key: numbers.pop(key) for key in list(numbers)[:3]}  # name, format, source
         return {**head, "files": [str(path) for path in self.paths], **numbers}
-
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
 
     def lines(self) -> list[str]:
         """What it is, what was assumed, and the files that were written."""

@@ -54,9 +54,10 @@ SWINGS = (0.7, 3.0)
 """Turns of drawn swings, over the turn at which contacts slip."""
 
 
-def rest_figure(rest: RobotAtRest, title: str) -> Figure:
+def rest_figure(rest: RobotAtRest) -> Figure:
     """The cables from the side and from above, tensions, and natural frequencies."""
     vibrates = rest.frequencies is not None
+    title = f"{rest.robot.name} at rest, {rest.model} cables, {rest.geometry}"
     words = f"{title}\ncables in the world frame W, tensions" + ", vibrations" * vibrates
     figure = bare_figure((12.0, 9.5), words)
     mosaic: list[Any] = [["side", "above"], ["tensions", "modes" if vibrates else "tensions"]]
