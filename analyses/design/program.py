@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 
 import numpy as np
 from pydrake.solvers import Binding, MathematicalProgram
@@ -30,7 +31,7 @@ from cdpr_drake.errors import DesignError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
-from cdpr_drake.numerics.program_functions import ProgramCost, ProgramFunction
+from cdpr_drake.numerics.program_functions import ProgramFunction, ValueCost
 from cdpr_drake.schema.yaml_files import load_yaml
 
 STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
@@ -39,8 +40,8 @@ STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
 STEP = 1e-4
 """Of differences of goals, in boxes of width 1."""
 
-MOST_KEPT = 200
-"""Designs whose goals are kept, since costs and constraints ask for the same ones."""
+MOST_KEPT = 1000
+"""Goals of designs that are kept, since costs and constraints ask for the same ones."""
 
 LOCAL = (
     "a design near the present robot: goals are not convex, and a search by evolution may find a "
@@ -100,7 +101,9 @@ class DesignProgram(OwnTerms):
         self._refuse_counts(self._goals)
         self.judging = goal_context(robot, settings)
         self._original = evaluate_original(self.candidates, self.judging, self._goals)
-        self._goals_at: dict[bytes, dict[str, float]] = {}
+        self._goal_at = lru_cache(MOST_KEPT)(self._goal_of_bytes)
+        self._first = self.candidates.points.size
+        self._lows, self._highs = np.array([*self.candidates.ranges.values()]).reshape(-1, 2).T
         self._values = self._read()
         self._prog = MathematicalProgram()
         self._z = self._prog.NewContinuousVariables(self.candidates.size, "design")
@@ -222,13 +225,11 @@ class DesignProgram(OwnTerms):
 
     def _goal(self, goal: str, z: Array) -> float:
         """The value of a goal, in its unit."""
-        values = self._goals_at.setdefault(z.tobytes(), {})
-        if goal not in values:
-            robot = self.candidates.robot(self.number, self._shares(z))
-            values[goal] = GOALS[goal].value(robot, self.judging)
-        while len(self._goals_at) > MOST_KEPT:
-            del self._goals_at[next(iter(self._goals_at))]
-        return values[goal]
+        return self._goal_at(goal, z.tobytes())
+
+    def _goal_of_bytes(self, goal: str, z: bytes) -> float:
+        robot = self.candidates.robot(self.number, self._shares(np.frombuffer(z)))
+        return GOALS[goal].value(robot, self.judging)
 
     def _refuse_counts(self, goals: Sequence[str]) -> None:
         smooth = [name for name in GOALS if name not in STEPPED]
@@ -254,35 +255,33 @@ class DesignProgram(OwnTerms):
             scale.append(high[axis, column] - low[axis, column])
             offset.append(float(cable[key][axis]) + low[axis, column])
             names.append(f"{cable['name']}.{key}.{'xyz'[axis]}")
-        for name, (least, most) in self.candidates.ranges.items():
-            scale.append(most - least)
-            offset.append(least)
-            names.append(name)
-        return np.array(scale), np.array(offset), tuple(names)
+        names += self.candidates.ranges
+        return (
+            np.array([*scale, *(self._highs - self._lows)]), np.array([*offset, *self._lows]),
+            tuple(names),
+        )  # fmt: skip
 
     def _present(self) -> Array:
         """The design variables of the robot as it is, within the ranges."""
         z = np.full(self.candidates.size, 0.5)
         winch = as_robot(self.robot).winch
-        for k, (name, (low, high)) in enumerate(self.candidates.ranges.items()):
-            value = getattr(winch, name)
+        for k, name in enumerate(self.candidates.ranges):
+            value, low, high = getattr(winch, name), self._lows[k], self._highs[k]
             if value is not None:
-                z[self.candidates.points.size + k] = np.clip((value - low) / (high - low), 0, 1)
+                z[self._first + k] = np.clip((value - low) / (high - low), 0, 1)
         return z
 
     def _shares(self, z: Array) -> Array:
         """Coordinates of `Candidates`, whose winches are in ratios."""
-        shares, first = np.array(z, float), self.candidates.points.size
-        for k, (low, high) in enumerate(self.candidates.ranges.values()):
-            shares[first + k] = np.log(1.0 + (high / low - 1.0) * z[first + k]) / np.log(high / low)
+        shares, ratios = np.array(z, float), self._highs / self._lows
+        shares[self._first :] = np.log(1.0 + (ratios - 1.0) * z[self._first :]) / np.log(ratios)
         return shares
 
     def _share_slopes(self, z: Array) -> Array:
         """How these grow with the variables, shape (size,)."""
-        slopes, first = np.ones(len(z)), self.candidates.points.size
-        for k, (low, high) in enumerate(self.candidates.ranges.values()):
-            more = high / low - 1.0
-            slopes[first + k] = more / (1.0 + more * z[first + k]) / np.log(high / low)
+        slopes, ratios = np.ones(len(z)), self._highs / self._lows
+        more = ratios - 1.0
+        slopes[self._first :] = more / (1.0 + more * z[self._first :]) / np.log(ratios)
         return slopes
 
 
@@ -306,22 +305,11 @@ class _ByDifferences(ProgramFunction):
         return self.numbers(x), np.array(slopes).T
 
 
-class _CostOf(ProgramCost):
+class _CostOf(ValueCost):
     """One number as a cost."""
 
     def __init__(self, rows: ProgramFunction) -> None:
         self._rows = rows
-
-    def value(self, x: Array) -> tuple[float, Array]:
-        """Cost and gradient."""
-        values, slopes = self._rows.rows(x)
-        return float(values[0]), slopes[0]
-
-    def __call__(self, x: np.ndarray) -> object:
-        """A number, or one with its gradient."""
-        if x.dtype != object:
-            return float(self._rows.numbers(np.asarray(x, float))[0])
-        return super().__call__(x)
 
 
 class _Margins(ProgramFunction):
