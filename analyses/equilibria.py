@@ -156,16 +156,14 @@ class Equilibria(Result):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The robot at its `DRAWN` lowest poses of rest; slack cables are dotted."""
-        return {"poses": self._draw}
-
-    def _draw(self) -> Figure:
         from cdpr_drake.analyses.visualization.path_figures import poses_figure
 
         lowest = self.rests[:DRAWN]
         poses = {f"{k + 1}: {rest.stability}": rest.X_WP for k, rest in enumerate(lowest)}
         what = f"{len(self.rests)} poses of rest, {self.model} cables, {self.geometry}"
         slack = [np.asarray(rest.tensions) <= 0.0 for rest in lowest]
-        return poses_figure(f"{self.robot.name}: {what}", self.robot, poses, slack)
+        title = f"{self.robot.name}: {what}"
+        return {"poses": lambda: poses_figure(title, self.robot, poses, slack)}
 
 
 @verb()
@@ -220,13 +218,10 @@ def find_equilibria(
     motion = loaded.motion_type()
     platform = HangingPlatform(
         cables=loaded.cable_set(pulleys and model == ELASTIC),
-        weight_W=loaded.platform.mass * loaded.gravity_vector(),
-        p_PCo=loaded.center_of_mass(),
-        num_turns=motion.num_turns,
-        num_moves=motion.num_moves,
-        axis=motion.axis,
+        weight_W=loaded.platform.mass * loaded.gravity_vector(), p_PCo=loaded.center_of_mass(),
+        num_turns=motion.num_turns, num_moves=motion.num_moves, axis=motion.axis,
         home=loaded.joint().nearest(loaded.home.transform()),
-    )
+    )  # fmt: skip
     subject: dict[str, Any]
     l0 = None if lengths is None else checked_lengths(lengths, len(loaded.cables), loaded.name)
     if l0 is not None and model == ELASTIC:

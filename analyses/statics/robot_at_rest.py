@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -215,7 +216,7 @@ def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool
     Raises:
         CdprError: The pose is outside the frame, or cannot be held; says why.
     """
-    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model)
     holding = hold_robot(robot, X_WP, cables, model)
     tensions, l0 = holding.tensions, holding.unstrained_lengths
     if not behaviour.changes_lengths():
@@ -246,7 +247,7 @@ def static_at_lengths(
     Raises:
         CdprError: No pose in the frame has these lengths without breaking a cable; by how much.
     """
-    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model)
     if not behaviour.changes_lengths():
         return _at_lengths(robot, cables, l0, model, seed)
     tensions = np.zeros(cables.count)
@@ -270,19 +271,17 @@ def _at_lengths(robot: Robot, cables: CableSet, l0: Array, model: str, seed: int
     if robot.plane_height is not None:
         lower[2] = robot.plane_height
     random = random_starts(lower, robot.frame.upper, STARTS, seed, platform.motion)
-    starts = [
-        robot.home.transform(), *(random if joint.is_as_world() else map(joint.nearest, random))
-    ]  # fmt: skip
+    starts = [robot.home.transform()]
+    starts += random if joint.is_as_world() else map(joint.nearest, random)
     check_model(model, cables)
     elastic = model if CABLE_MODELS[model].law != STRAIGHT else "elastic"
     # Elastic cables always come to rest somewhere; the tension they need there tells whether the
     # lengths make sense.
     rests = equilibria(cables, elastic, platform, l0, starts)
     low, high = robot.frame.bounds()
-    inside = [
-        rest for rest in rests
-        if np.all(rest.X_WP.translation() >= low) and np.all(rest.X_WP.translation() <= high)
-    ]  # fmt: skip
+    places = np.array([rest.X_WP.translation() for rest in rests])
+    within = np.all((low <= places) & (places <= high), axis=1)
+    inside = list(compress(rests, within))
     if not inside:
         check_pose(robot, rests[0].X_WP)
     strength = np.minimum(cables.breaking_load, LARGEST_STRAIN * cables.stiffness)
@@ -349,16 +348,10 @@ def _at_rest(
     )  # fmt: skip
 
 
-def _behaviour(robot: Robot, model: str, pulleys: bool) -> CableBehaviour:
-    """What the robot's cables do beside the elastic law.
-
-    Raises:
-        CableModelError: The model, or the robot's pulleys, do not go with it.
-    """
-    behaviour = robot.cable_behaviour()
-    known = CABLE_MODELS.get(model)
-    elastic = known is not None and known.extensible and known.law == STRAIGHT
-    if behaviour.changes_lengths() and known is not None and not elastic:
+def _behaviour(robot: Robot, model: str) -> CableBehaviour:
+    """What the robot's cables do beside the elastic law; refuses models that do not go with it."""
+    behaviour, law = robot.cable_behaviour(), CABLE_MODELS.get(model)
+    if behaviour.changes_lengths() and law and not (law.extensible and law.law == STRAIGHT):
         raise CableModelError(
             f"cable model: found {model} for cables that stiffen or are warm, see cable.behaviour "
             f"of {robot.name}; accepted: elastic, kelvin_voigt"
@@ -367,11 +360,7 @@ def _behaviour(robot: Robot, model: str, pulleys: bool) -> CableBehaviour:
 
 
 def _drums(robot: Robot, cables: CableSet, X_WP: RigidTransform, tensions: Array) -> Array | None:
-    """Tensions at the drums, wound up and paid out, shape (2, m) [N]; None without friction.
-
-    Raises:
-        CableModelError: Cables run over pulleys at the platform, too.
-    """
+    """Tensions at the drums, wound up and paid out, shape (2, m) [N]; None without friction."""
     friction = robot.cable_behaviour().sheave_friction
     if friction == 0.0 or not cables.has_pulleys():
         return None
