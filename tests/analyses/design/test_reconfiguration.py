@@ -31,9 +31,9 @@ def rail_file(folder, **changes):
 
 def test_a_robot_is_moved_proven_and_drawn():
     moved = cdpr.reconfigure("planar", rails=RAILS, poses=POSES, starts=2, **SMALL)
-    before, after = np.min(moved.margins, axis=1)
-    assert after > before + 0.01
-    assert moved.names == ["C1,C2", "C3"]
+    after = moved.poses["margin"].min()
+    assert after > moved.poses["margin_before"].min() + 0.01
+    assert list(moved.rails["cables"]) == ["C1,C2", "C3"]
     shifts = moved.after.exit_points() - load_robot("planar").exit_points()
     np.testing.assert_allclose(shifts[1, 0], shifts[1, 1])
     np.testing.assert_allclose(shifts[1, [0, 2]], moved.solution.coordinates)
@@ -51,14 +51,15 @@ def test_a_robot_is_moved_proven_and_drawn():
     assert "of each: proven" in repr(moved)
     assert len(moved.plot().axes) == 2
     least = cdpr.reconfigure("planar", rails=RAILS, poses=POSES, starts=2, goal="tension", **SMALL)
-    assert np.max(least.tensions) < np.max(moved.tensions) + 1e-3
-    assert np.min(least.margins[1]) <= after + 1e-6
+    tensions = [result.poses["largest_tension_n"].max() for result in (least, moved)]
+    assert tensions[0] < tensions[1] + 1e-3
+    assert least.poses["margin"].min() <= after + 1e-6
 
 
 def test_rails_of_the_robots_own_file():
     robot = put_rails(load_robot("planar"), RAILS)
     moved = cdpr.reconfigure(robot, poses=POSES[:1], starts=1, **SMALL)
-    assert moved.names == ["C1", "C2", "C3"]  # without groups each moves alone
+    assert list(moved.rails["cables"]) == ["C1", "C2", "C3"]  # without groups each moves alone
 
 
 @pytest.mark.parametrize(
