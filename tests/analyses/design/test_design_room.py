@@ -112,5 +112,13 @@ def test_slopes_lead_between_functions_to_the_largest_least():
     assert len(designs) < 30
 
 
+def test_steps_shrink_where_slopes_promise_too_much():
+    def slopes_at(x):
+        return -((x - 0.37) ** 2), -2.0 * (x - 0.37)[:, np.newaxis]
+
+    designs = answered(climb(1, 60, slopes_at), lambda X: -((X - 0.37) ** 2))
+    assert min(abs(X[0, 0] - 0.37) for X in designs) < 1e-3
+
+
 def test_a_first_design_that_is_refused_ends_the_search():
     assert len(answered(climb(3, 9, None), lambda x: np.array([[np.nan]]))) == 1
