@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -80,29 +79,25 @@ def list_robots(
     if motion is not None and motion.upper() not in motions:
         raise CdprError(f"motion: found {motion!r}; {accepted_names(motion, motions)}")
     low, high = cables or (0.0, np.inf)
-    tests: list[tuple[object, Callable[[Robot], object]]] = [
-        (motion and motion.upper(), lambda robot: robot.motion),
-        (cables and True, lambda robot: low <= len(robot.cables) <= high),
-        (suspended, is_suspended),
-        (underactuated, Robot.is_underactuated),
-        (camera, lambda robot: bool(robot.cameras)),
-        (search and True, lambda robot: search.lower() in f"{robot.name} {robot.title}".lower()),  # type: ignore[union-attr]
-    ]
     chosen = [
         robot for robot in robots
-        if all(value in (None, "") or test(robot) == value for value, test in tests)
+        if (motion is None or robot.motion == motion.upper())
+        and low <= len(robot.cables) <= high
+        and suspended in (None, is_suspended(robot))
+        and underactuated in (None, robot.is_underactuated())
+        and camera in (None, bool(robot.cameras))
+        and (search or "").lower() in f"{robot.name} {robot.title}".lower()
     ]  # fmt: skip
     if not chosen:
         raise CdprError(
             f"motion, cables, ...: found no robot with all of these; accepted: what one of the "
             f"{len(robots)} has, see cdpr robots"
         )
+    entries = [robot_facts(robot) for robot in chosen]
     if gallery is not None:
         from cdpr_drake.analyses.visualization.robot_gallery import gallery_page
 
         write_files(gallery.parent, {gallery.name: gallery_page(chosen)}, overwrite=True)
-    entries = [robot_facts(robot) for robot in chosen]
-    if gallery is not None:
         return Listing(entries, words=[str(gallery)])
     return Listing(entries, Table("Robots", ("name", "motion", "m", "mass", "frame", "speed"), [
         (robot.name, robot.motion, str(len(robot.cables)), f"{robot.platform.mass:g} kg",

@@ -71,7 +71,7 @@ class ForeignModel(Result):
 
     def lines(self) -> list[str]:
         """What it is, what was assumed, and the files that were written."""
-        made = self.model.completed
+        completed = self.model.completed
         if isinstance(self.model, ImportedMechanism):
             tree = self.model.tree
             words = (
@@ -83,8 +83,8 @@ class ForeignModel(Result):
             words = (
                 f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {self.model.tool}"
             )
-        assumed = [f"  assumed {key}: {why}" for key, why in made.assumed.items()]
-        notes = [f"  note: {remark}" for remark in made.remarks]
+        assumed = [f"  assumed {key}: {why}" for key, why in completed.assumed.items()]
+        notes = [f"  note: {remark}" for remark in completed.remarks]
         return [words, *assumed, *notes, *map(str, self.paths)]
 
     def figures(self) -> dict[str, Callable[[], Figure]]:

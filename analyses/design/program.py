@@ -152,8 +152,8 @@ class DesignProgram(OwnTerms):
         self._refuse_counts([goal])
         low, high = self._bounds(lower, upper, 1)
         size = max(abs(self._goal(goal, self._present())), 1e-9)
-        made = _ByDifferences(lambda z: np.array([self._goal(goal, z) / size]))
-        binding = self._prog.AddConstraint(made, low / size, high / size, vars=self._z)
+        rows = _ByDifferences(lambda z: np.array([self._goal(goal, z) / size]))
+        binding = self._prog.AddConstraint(rows, low / size, high / size, vars=self._z)
         return self._named(binding, "constraint", name or goal)
 
     def AddGoalCost(
@@ -190,7 +190,7 @@ class DesignProgram(OwnTerms):
         for least, slopes in self._leasts:
             margins, _ = self._margins(slopes, start[places])
             start[self._prog.FindDecisionVariableIndex(least)] = float(np.min(margins))
-        x, solver, said = self._solve_whole(start, "a design")
+        x, solver, status = self._solve_whole(start, "a design")
         designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
         values = np.array([
             evaluate_goals(self.candidates.robot(self.number, design), self.judging, self._goals)
@@ -200,15 +200,15 @@ class DesignProgram(OwnTerms):
             self.candidates, self.settings, self.judging, self._original,
             np.full(2, self.number), designs, values,
             scores_of(values, self._original, self.settings),
-            program=self._report(x, solver, said, (LOCAL,)),
+            program=self._report(x, solver, status, (LOCAL,)),
         )  # fmt: skip
 
     def _add_goal(self, goal: str, weight: float) -> None:
         slopes = SLOPES.get(goal)
         if slopes is None:
             less = -weight * float(goal_signs([goal])[0])
-            made = _ByDifferences(lambda z: np.array([less * self._goal(goal, z)]))
-            self._prog.AddCost(_CostOf(made), vars=self._z)
+            cost = _ByDifferences(lambda z: np.array([less * self._goal(goal, z)]))
+            self._prog.AddCost(_CostOf(cost), vars=self._z)
             return
         (least,) = self._prog.NewContinuousVariables(1, f"least {goal}")
         rows = _Margins(lambda z: self._margins(slopes, z))
