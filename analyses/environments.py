@@ -52,19 +52,19 @@ def list_environments(
             "steps": spec.max_episode_steps, "period_s": task.options.period,
             "reach_m": task.reach, "task": about.partition(": ")[2].rstrip("."),
         })  # fmt: skip
-    words = []
+    lines = []
     if picture is not None:
         env = make_environment(str(name), robot=robot, action=action, render_mode="rgb_array")
         env.reset(seed=0)
         _write(picture, env.render())
-        words.append(f"picture: {picture}")
+        lines.append(f"picture: {picture}")
     headings = ("name", "actions", "observations", "steps", "of [s]", "the task")
     title = f"Learning environments of {robot}, by {action}"
     return Listing(rows, Table(title, headings, [
         (row["name"], str(row["actions"]), str(row["observations"]), str(row["steps"]),
          f"{row['period_s']:g}", row["task"])
         for row in rows
-    ]), words)  # fmt: skip
+    ]), lines)  # fmt: skip
 
 
 def _write(path: Path, image: Any) -> None:

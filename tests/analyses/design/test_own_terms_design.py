@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from cdpr_drake.analyses.design.goals import evaluate_goals
 from cdpr_drake.analyses.design.program import DesignProgram
@@ -69,6 +70,19 @@ def test_values_are_those_of_the_robot_file():
     z = np.random.default_rng(0).uniform(size=16)
     moved = program.candidates.robot(0, program._shares(z)).exit_points()
     np.testing.assert_allclose(v.at(z), moved[[0, 2]].T.ravel(), atol=1e-12)
+
+
+def test_slopes_of_points_and_winch_are_those_of_differences():
+    settings = small("capacity-margin", reach=(0.1, 0.0, 0.1))
+    settings.winch.motor_torque, settings.winch.drum_radius = np.array([[0.2, 0.8], [0.02, 0.08]])
+    (binding,) = DesignProgram(ROBOT, settings).prog().generic_constraints()
+    rows, size = binding.evaluator(), binding.evaluator().num_vars()
+    x, step = np.random.default_rng(0).uniform(0.4, 0.6, size), 1e-5
+    slopes = ExtractGradient(rows.Eval(InitializeAutoDiff(x)))
+    for k in (0, size - 3, size - 2, size - 1):  # a point, both of the winch, the least margin
+        e = step * np.eye(size)[k]
+        differences = (rows.Eval(x + e) - rows.Eval(x - e)) / (2.0 * step)
+        np.testing.assert_allclose(slopes[:, k], differences, atol=1e-5 * np.max(np.abs(slopes)))
 
 
 def test_with_nothing_added_the_search_answers():
