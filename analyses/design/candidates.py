@@ -75,7 +75,7 @@ class MovedPoints:
         for k in range(3 * m):
             first, s = root(k)
             groups.setdefault(first, []).append((k, s))
-        self._columns: list[Array] = []
+        columns = []
         for first, members in groups.items():
             half = min(self.reach[k % 3, k // 3] for k, _ in members)
             if first in still or half <= 0.0:
@@ -83,7 +83,8 @@ class MovedPoints:
             column = np.zeros(3 * m)
             for k, s in members:
                 column[k] = s * half
-            self._columns.append(column.reshape(m, 3).T)
+            columns.append(column.reshape(m, 3).T)
+        self._columns = np.array(columns).reshape(-1, 3, m)
 
     @property
     def size(self) -> int:
@@ -92,19 +93,12 @@ class MovedPoints:
 
     def displacements(self, coordinates: Array) -> Array:
         """Displacements, shape (3, m) [m]; those of coordinates of 0.5 are zero."""
-        moved = np.zeros_like(self.reach)
-        for value, column in zip(coordinates, self._columns, strict=True):
-            moved += (2.0 * value - 1.0) * column
-        return moved
+        return np.tensordot(2.0 * np.asarray(coordinates) - 1.0, self._columns, 1)
 
     def slopes(self, by_points: Array) -> Array:
-        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points.
-
-        Args:
-            by_points: Shape (n, 3, m) [1/m].
-        """
-        columns = np.array(self._columns).reshape(-1, *self.reach.shape)
-        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, columns))
+        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points, shape
+        (n, 3, m) [1/m]."""
+        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, self._columns))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,11 @@ import pytest
 
 from cdpr_drake.analyses import installation as doctor
 from cdpr_drake.errors import RenderingError
+from tests.cli.commands import told
 
 
-def test_this_machine_is_well():
-    examination = doctor.examine_installation()
-    checks = {entry["check"]: entry["passed"] for entry in examination.as_dict()}
-    assert examination.exit_code == 0
+def test_this_machine_is_well(capsys):
+    checks = {entry["check"]: entry["passed"] for entry in told(capsys, "doctor")}
     assert all(checks.values())
     assert {"Python", "drake", "EGL", "rendered camera", "gymnasium"} <= set(checks)
 
