@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,13 +11,12 @@ import numpy as np
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.files import write_files
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Listing, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import words
 from cdpr_drake.errors import CdprError, OutputFolderError, accepted_names
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
-from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.robot_schema import Robot
 
@@ -42,33 +40,6 @@ CableCounts = Annotated[
 ]
 
 
-@dataclass(frozen=True, repr=False)
-class Catalogue(Result):
-    """Things that come with the package.
-
-    Attributes:
-        entries: What a list says of each; keys end in SI units.
-        table: The list.
-        page: Page of pictures that was written.
-    """
-
-    entries: Sequence[dict[str, Any]]
-    table: Table
-    page: Path | None = None
-
-    def as_dict(self) -> list[dict[str, Any]]:
-        """A list, an entry each."""
-        return list(self.entries)
-
-    def tables(self) -> list[Table]:
-        """The list; none beside a page."""
-        return [self.table] if self.page is None else []
-
-    def lines(self) -> list[str]:
-        """Path of the page."""
-        return [] if self.page is None else [str(self.page)]
-
-
 @verb()
 def list_robots(
     *, motion: str | None = None, cables: CableCounts = None,
@@ -77,7 +48,7 @@ def list_robots(
     camera: bool | None = None, search: str | None = None,
     gallery: Annotated[Path | None, words(Path, "a file that ends in .html", "FILE")] = None,
     mechanisms: bool = False,
-) -> Catalogue:  # fmt: skip
+) -> Listing:  # fmt: skip
     """Lists the robots that come with the package; options filter them.
 
     Args:
@@ -108,29 +79,32 @@ def list_robots(
     if motion is not None and motion.upper() not in motions:
         raise CdprError(f"motion: found {motion!r}; {accepted_names(motion, motions)}")
     low, high = cables or (0.0, np.inf)
-    tests: list[tuple[object, Callable[[Robot], object]]] = [
-        (motion and motion.upper(), lambda robot: robot.motion),
-        (cables and True, lambda robot: low <= len(robot.cables) <= high),
-        (suspended, is_suspended),
-        (underactuated, Robot.is_underactuated),
-        (camera, lambda robot: bool(robot.cameras)),
-        (search and True, lambda robot: search.lower() in f"{robot.name} {robot.title}".lower()),  # type: ignore[union-attr]
-    ]
     chosen = [
         robot for robot in robots
-        if all(value in (None, "") or test(robot) == value for value, test in tests)
+        if (motion is None or robot.motion == motion.upper())
+        and low <= len(robot.cables) <= high
+        and suspended in (None, is_suspended(robot))
+        and underactuated in (None, robot.is_underactuated())
+        and camera in (None, bool(robot.cameras))
+        and (search or "").lower() in f"{robot.name} {robot.title}".lower()
     ]  # fmt: skip
     if not chosen:
         raise CdprError(
             f"motion, cables, ...: found no robot with all of these; accepted: what one of the "
             f"{len(robots)} has, see cdpr robots"
         )
+    entries = [robot_facts(robot) for robot in chosen]
     if gallery is not None:
         from cdpr_drake.analyses.visualization.robot_gallery import gallery_page
 
         write_files(gallery.parent, {gallery.name: gallery_page(chosen)}, overwrite=True)
-    entries = [robot_facts(robot) for robot in chosen]
-    return Catalogue(entries, _robot_table(entries), gallery)
+        return Listing(entries, words=[str(gallery)])
+    return Listing(entries, Table("Robots", ("name", "motion", "m", "mass", "frame", "speed"), [
+        (robot.name, robot.motion, str(len(robot.cables)), f"{robot.platform.mass:g} kg",
+         " x ".join(f"{span:g}" for span in robot.frame.upper - robot.frame.lower) + " m",
+         f"{robot.winch.rated_cable_speed():.2f} m/s")
+        for robot in chosen
+    ]))  # fmt: skip
 
 
 def is_suspended(robot: Robot) -> bool:
@@ -158,51 +132,37 @@ def robot_facts(robot: Robot) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _robot_table(entries: Sequence[dict[str, Any]]) -> Table:
-    def frame(entry: dict[str, Any]) -> str:
-        spans = zip(*entry["frame_m"], strict=True)
-        return " x ".join(f"{high - low:g}" for low, high in spans) + " m"
-
-    return Table("Robots", ("name", "motion", "m", "mass", "frame", "speed"), [
-        (entry["name"], entry["motion"], str(entry["cables"]),
-         f"{entry['platform_mass_kg']:g} kg", frame(entry),
-         f"{entry['rated_cable_speed_m_s']:.2f} m/s")
-        for entry in entries
-    ])  # fmt: skip
-
-
-def _mechanisms() -> Catalogue:
-    entries = [_mechanism_facts(load_mechanism(name)) for name in mechanism_names()]
-    table = Table("Mechanisms", ("name", "m", "tensions", "title"), [
+def _mechanisms() -> Listing:
+    entries: list[dict[str, Any]] = [
+        {
+            "name": mechanism.name, "title": mechanism.title, "cables": len(mechanism.cables),
+            "eyelets": sum(len(cable.via) for cable in mechanism.cables),
+            "tension_bounds_n": list(mechanism.tension_limits()),
+            "assumptions": mechanism.assumptions,
+        }
+        for mechanism in map(load_mechanism, mechanism_names())
+    ]  # fmt: skip
+    return Listing(entries, Table("Mechanisms", ("name", "m", "tensions", "title"), [
         (entry["name"], str(entry["cables"]), "{:g}..{:g} N".format(*entry["tension_bounds_n"]),
          entry["title"])
         for entry in entries
-    ])  # fmt: skip
-    return Catalogue(entries, table)
-
-
-def _mechanism_facts(mechanism: Mechanism) -> dict[str, Any]:
-    return {
-        "name": mechanism.name, "title": mechanism.title, "cables": len(mechanism.cables),
-        "eyelets": sum(len(cable.via) for cable in mechanism.cables),
-        "tension_bounds_n": list(mechanism.tension_limits()), "assumptions": mechanism.assumptions,
-    }  # fmt: skip
+    ]))  # fmt: skip
 
 
 @verb()
-def list_scenarios() -> Catalogue:
+def list_scenarios() -> Listing:
     """Lists the scenarios that come with the package."""
     from cdpr_drake.systems.diagrams.load import load_scenario  # which loads all blocks
     from cdpr_drake.systems.scenarios.files import scenario_names
 
     entries = [scenario_facts(load_scenario(name)) for name in scenario_names()]
-    table = Table("Scenarios", ("name", "robot", "duration", "ends", "what it shows"), [
+    headings = ("name", "robot", "duration", "ends", "what it shows")
+    return Listing(entries, Table("Scenarios", headings, [
         (entry["name"], entry["robot"] or entry["mechanism"], f"{entry['duration_s']:g} s",
          "" if entry["expected"] is None else entry["expected"]["outcome"].replace("_", " "),
          entry["title"])
         for entry in entries
-    ])  # fmt: skip
-    return Catalogue(entries, table)
+    ]))  # fmt: skip
 
 
 def scenario_facts(scenario: Any) -> dict[str, Any]:

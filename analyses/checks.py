@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Listing
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.front.logs import ImportedLog, import_log
 from cdpr_drake.analyses.logs.log_formats import detect_log
@@ -40,63 +40,19 @@ LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".py")
 """Endings of files that may be logs; a reader has to know what is in them, too."""
 
 
-class CheckedFile(NamedTuple):
-    """What is wrong with a file.
-
-    Attributes:
-        file: The file, as the user named it.
-        kind: What it is, in words; None if something is wrong.
-        problems: What is wrong, a line each.
-        notes: What a user may want to know of it.
-        log: What was read, if it is a log.
-    """
-
-    file: str
-    kind: str | None
-    problems: Sequence[str] = ()
-    notes: Sequence[str] = ()
-    log: ImportedLog | None = None
-
-
 @dataclass(frozen=True, repr=False)
-class CheckedFiles(Result):
+class CheckedFiles(Listing):
     """All that is wrong with some files.
 
     Attributes:
-        files: What is said of each.
+        log: What was read, if one log was checked.
     """
 
-    files: Sequence[CheckedFile]
-
-    def as_dict(self) -> list[dict[str, Any]]:
-        """A list, an entry each."""
-        return [
-            {"file": file.file, "kind": file.kind, "problems": list(file.problems),
-             "notes": list(file.notes)}
-            for file in self.files
-        ]  # fmt: skip
-
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
-
-    def lines(self) -> list[str]:
-        """Problems and notes."""
-        lines: list[str] = []
-        for file in self.files:
-            lines += file.problems or [f"{file.file}: valid {file.kind}"]
-            lines += [f"  note: {note}" for note in file.notes]
-        return lines
+    log: ImportedLog | None = None
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The log, if one log was checked."""
-        log = self.files[0].log if len(self.files) == 1 else None
-        return {} if log is None else {"log": log.plot}
-
-    @property
-    def exit_code(self) -> int:
-        """2 if something is wrong."""
-        return WRONG if any(file.problems for file in self.files) else 0
+        return {} if self.log is None else {"log": self.log.plot}
 
 
 @verb()
@@ -109,41 +65,50 @@ def check_files(files: Sequence[Path], /) -> CheckedFiles:
     Args:
         files: Robot or scenario files or names, files of other tools, or logs.
     """
-    return CheckedFiles([_checked(path) for path in files])
+    entries: list[dict[str, Any]] = []
+    words: list[str] = []
+    logs: list[ImportedLog | None] = []
+    for file in files:
+        entry: dict[str, Any] = {"file": str(file), "kind": None, "problems": [], "notes": []}
+        try:
+            entry["kind"], entry["notes"], log = _read(_file_of(file))
+            logs.append(log)
+            words.append(f"{file}: valid {entry['kind']}")
+        except CdprError as problem:
+            entry["problems"] = str(problem).split("\n")
+            words += entry["problems"]
+        words += [f"  note: {note}" for note in entry["notes"]]
+        entries.append(entry)
+    code = WRONG if any(entry["problems"] for entry in entries) else 0
+    return CheckedFiles(
+        entries, None, words, code, logs[0] if len(files) == len(logs) == 1 else None
+    )
 
 
-def _checked(path: Path) -> CheckedFile:
-    try:
-        return _read(path, _file_of(path))
-    except CdprError as problem:
-        return CheckedFile(str(path), None, str(problem).split("\n"))
-
-
-def _read(named: Path, path: Path) -> CheckedFile:
-    """What a file is; raises what is wrong with it."""
-    name = str(named)
+def _read(path: Path) -> tuple[str, list[str], ImportedLog | None]:
+    """What a file is, what a user may want to know of it, and a log; raises what is wrong."""
     if is_log(path):
         log = import_log(path)
         first, *notes = log.lines()
         kind = "log, " + first.removeprefix(f"{path}: ")
-        return CheckedFile(name, kind, notes=[note.strip() for note in notes], log=log)
+        return kind, [note.strip() for note in notes], log
     if is_foreign(path):
         imported = import_robot(path)
         assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
         notes = [*assumed, *imported.completed.remarks, *point_notes(imported.robot)]
-        return CheckedFile(name, f"robot, {imported.tool}", notes=notes)
+        return f"robot, {imported.tool}", notes, None
     if _is_scenario(path):
         load_scenario(str(path))
-        return CheckedFile(name, "scenario")
+        return "scenario", [], None
     if names_mechanism(path):
-        return CheckedFile(name, "mechanism", notes=_mechanism_notes(path))
+        return "mechanism", _mechanism_notes(path), None
     robot = load_robot(str(path))
     notes = point_notes(robot)
     try:
         hold_robot(robot, robot.home.transform(), robot.cable_set(), "elastic")
     except CdprError as problem:
         notes.append(f"the home pose: {problem}")
-    return CheckedFile(name, "robot", notes=notes)
+    return "robot", notes, None
 
 
 def _file_of(path: Path) -> Path:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Listing, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import RobotWord, words
 from cdpr_drake.errors import CdprError, OutputFolderError, why_not_read
@@ -22,46 +19,12 @@ BEGIN, END = "cdpr/", "-v0"
 """Before and after the name of a task in Gymnasium's list."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Environments(Result):
-    """Learning environments of a robot.
-
-    Attributes:
-        robot: Name of the robot.
-        action: Name of what an action sets.
-        rows: What each has, keys as for JSON.
-        picture: File of a picture; None: none was drawn.
-    """
-
-    robot: str
-    action: str
-    rows: Sequence[dict[str, Any]]
-    picture: Path | None = None
-
-    def as_dict(self) -> list[dict[str, Any]]:
-        """For JSON; keys end in units."""
-        return list(self.rows)
-
-    def tables(self) -> list[Table]:
-        """A row for each environment."""
-        headings = ("name", "actions", "observations", "steps", "of [s]", "the task")
-        return [Table(f"Learning environments of {self.robot}, by {self.action}", headings, [
-            (row["name"], str(row["actions"]), str(row["observations"]), str(row["steps"]),
-             f"{row['period_s']:g}", row["task"])
-            for row in self.rows
-        ])]  # fmt: skip
-
-    def lines(self) -> list[str]:
-        """Where the picture is."""
-        return [] if self.picture is None else [f"picture: {self.picture}"]
-
-
 @verb()
 def list_environments(
     name: Annotated[str | None, Parameter(metavar="NAME")] = None, *,
     robot: RobotWord = "acrobot_small", action: str = "twist",
     picture: Annotated[Path | None, words(Path, "the path of a .png", "FILE.png")] = None,
-) -> Environments:  # fmt: skip
+) -> Listing:  # fmt: skip
     """Lists the Gymnasium environments, with the sizes of action and observation for a robot.
 
     Args:
@@ -89,11 +52,19 @@ def list_environments(
             "steps": spec.max_episode_steps, "period_s": task.options.period,
             "reach_m": task.reach, "task": about.partition(": ")[2].rstrip("."),
         })  # fmt: skip
+    lines = []
     if picture is not None:
         env = make_environment(str(name), robot=robot, action=action, render_mode="rgb_array")
         env.reset(seed=0)
         _write(picture, env.render())
-    return Environments(str(robot), action, rows, picture)
+        lines.append(f"picture: {picture}")
+    headings = ("name", "actions", "observations", "steps", "of [s]", "the task")
+    title = f"Learning environments of {robot}, by {action}"
+    return Listing(rows, Table(title, headings, [
+        (row["name"], str(row["actions"]), str(row["observations"]), str(row["steps"]),
+         f"{row['period_s']:g}", row["task"])
+        for row in rows
+    ]), lines)  # fmt: skip
 
 
 def _write(path: Path, image: Any) -> None:
@@ -111,7 +82,8 @@ def environment_names() -> list[str]:
     Raises:
         CdprError: Gymnasium is not installed.
     """
-    return [f"{BEGIN}{name}{END}" for name in _registered().STEPS]
+    registered: Any = import_module("cdpr_drake.gym")
+    return [f"{BEGIN}{name}{END}" for name in registered.STEPS]
 
 
 def make_environment(name: str, count: int | None = None, **options: Any) -> Any:
@@ -132,20 +104,14 @@ def make_environment(name: str, count: int | None = None, **options: Any) -> Any
         CdprError: Gymnasium is not installed; there is no such environment, or an option is not
             accepted.
     """
-    known = environment_names()
-    asked = name if name.startswith(BEGIN) else f"{BEGIN}{name}{END}"
-    if asked not in known:
-        short = [one.removeprefix(BEGIN).removesuffix(END) for one in known]
+    names = environment_names()
+    full = name if name.startswith(BEGIN) else f"{BEGIN}{name}{END}"
+    if full not in names:
+        short = [each.removeprefix(BEGIN).removesuffix(END) for each in names]
         raise CdprError(f"environment {name!r} is unknown; {closest(name, short)}")
     if count is not None and count < 1:
         raise CdprError(f"count: found {count}; accepted: 1 or more")
     gymnasium: Any = import_module("gymnasium")
-    make: Callable[..., Any] = gymnasium.make if count is None else gymnasium.make_vec
-    if count is not None:
-        options = {"num_envs": count, **options}
-    return make(asked, **options)
-
-
-def _registered() -> ModuleType:
-    """What registers them, once."""
-    return import_module("cdpr_drake.gym")
+    if count is None:
+        return gymnasium.make(full, **options)
+    return gymnasium.make_vec(full, num_envs=count, **options)

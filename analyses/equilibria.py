@@ -25,7 +25,6 @@ from cdpr_drake.statics.equilibrium import Stability
 from cdpr_drake.statics.equilibrium_enumeration import enumerate_equilibria
 from cdpr_drake.statics.equilibrium_search import sample_equilibria
 from cdpr_drake.statics.inextensible_problem import EquilibriumPose, HangingPlatform
-from cdpr_drake.statics.real_solutions import PathCount
 from cdpr_drake.summaries import numbers
 
 if TYPE_CHECKING:
@@ -52,7 +51,6 @@ class Equilibria(Result):
         lengths: Given lengths, shape (m,) [m]; None where a position was given.
         rests: The poses, the lowest energy first.
         evidence: Numbers that tell whether poses are missing.
-        words: The same in a line.
     """
 
     robot: Robot
@@ -61,7 +59,6 @@ class Equilibria(Result):
     lengths: Array | None
     rests: Sequence[EquilibriumPose]
     evidence: dict[str, Any]
-    words: str
 
     @property
     def geometry(self) -> str:
@@ -134,20 +131,39 @@ class Equilibria(Result):
 
     def lines(self) -> list[str]:
         """The evidence."""
-        return ["cables without a tension are slack; " + self.words]
+        evidence = self.evidence
+        if self.model == ELASTIC:
+            words = (
+                f"{evidence['searches']} searches, {evidence['ended_at_rest']} ended at rest; not "
+            )
+            words += "proven to be all"
+            if evidence["expected_in_all"] is not None:
+                words += f": {evidence['expected_in_all']:.1f} expected"
+            if not evidence["stopped_by_rule"]:
+                words += "; the stopping rule asks for more searches"
+        elif evidence["lost"]:
+            words = f"{evidence['lost']} of {evidence['paths']} paths lost: poses may be missing"
+        else:
+            words = "closed form: no pose is missing"
+            if evidence["paths"]:
+                words = (
+                    f"all {evidence['paths']} paths to complex solutions ended: no isolated pose "
+                )
+                words += "is missing"
+            if evidence["to_singular_solutions"]:
+                words += f", but where solutions meet ({evidence['to_singular_solutions']})"
+        return ["cables without a tension are slack; " + words]
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The robot at its `DRAWN` lowest poses of rest; slack cables are dotted."""
-        return {"poses": self._draw}
-
-    def _draw(self) -> Figure:
         from cdpr_drake.analyses.visualization.path_figures import poses_figure
 
         lowest = self.rests[:DRAWN]
         poses = {f"{k + 1}: {rest.stability}": rest.X_WP for k, rest in enumerate(lowest)}
         what = f"{len(self.rests)} poses of rest, {self.model} cables, {self.geometry}"
         slack = [np.asarray(rest.tensions) <= 0.0 for rest in lowest]
-        return poses_figure(f"{self.robot.name}: {what}", self.robot, poses, slack)
+        title = f"{self.robot.name}: {what}"
+        return {"poses": lambda: poses_figure(title, self.robot, poses, slack)}
 
 
 @verb()
@@ -202,84 +218,44 @@ def find_equilibria(
     motion = loaded.motion_type()
     platform = HangingPlatform(
         cables=loaded.cable_set(pulleys and model == ELASTIC),
-        weight_W=loaded.platform.mass * loaded.gravity_vector(),
-        p_PCo=loaded.center_of_mass(),
-        num_turns=motion.num_turns,
-        num_moves=motion.num_moves,
-        axis=motion.axis,
+        weight_W=loaded.platform.mass * loaded.gravity_vector(), p_PCo=loaded.center_of_mass(),
+        num_turns=motion.num_turns, num_moves=motion.num_moves, axis=motion.axis,
         home=loaded.joint().nearest(loaded.home.transform()),
-    )
-    l0 = None
-    if position is not None:
-        rests, evidence, words = _at_position(loaded, platform, position, taut)
-    else:
-        l0 = checked_lengths(lengths, len(loaded.cables), loaded.name)
-        if model == INEXTENSIBLE:
-            every = enumerate_equilibria(platform, l0, report)
-            rests, (evidence, words) = every.rests, _counted(every.paths)
-            evidence["taut_sets"] = every.sets
-        else:
-            rests, evidence, words = _searched(platform, l0, searches, seed, report)
-    return Equilibria(
-        robot=loaded, model=model, platform=platform, lengths=l0, rests=rests, evidence=evidence,
-        words=words,
     )  # fmt: skip
-
-
-def _at_position(
-    robot: Robot, platform: HangingPlatform, position: Sequence[float] | Array,
-    taut: Sequence[str] | None,
-) -> tuple[Sequence[EquilibriumPose], dict[str, Any], str]:  # fmt: skip
-    """Poses with Po at a position, on cables named `taut`, and the evidence."""
-    p_WP = np.asarray(position, float)
-    if p_WP.shape != (3,) or not np.all(np.isfinite(p_WP)):
-        raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
-    names = [cable.name for cable in robot.cables]
-    taut = names if taut is None else taut
-    for name in taut:
-        if name not in names:
-            raise EquilibriumError(f"taut: found {name!r}; {accepted_names(name, names)}")
-    every = enumerate_at_position(platform, p_WP, [names.index(name) for name in taut])
-    evidence, words = _counted(every.paths)
-    evidence["taut"] = list(taut)
-    return every.rests, evidence, words
-
-
-def _searched(
-    platform: HangingPlatform, l0: Array, searches: int, seed: int,
-    report: Callable[[int, int], object],
-) -> tuple[Sequence[EquilibriumPose], dict[str, Any], str]:  # fmt: skip
-    """Poses on straight elastic cables, searched from random poses, and the evidence."""
-    sample = sample_equilibria(
-        platform, l0, most=searches, seed=seed, starts=[platform.home], report=report
-    )
-    expected = sample.expected if np.isfinite(sample.expected) else None
-    evidence = {
-        "method": "multi-start", "complete": False, "searches": sample.searches,
-        "ended_at_rest": sample.ended, "expected_in_all": expected,
-        "covered_share_of_starts": sample.covered, "stopped_by_rule": sample.stopped, "seed": seed,
-    }  # fmt: skip
-    words = f"{sample.searches} searches, {sample.ended} ended at rest; not proven to be all"
-    if expected is not None:
-        words += f": {expected:.1f} expected"
-    if not sample.stopped:
-        words += "; the stopping rule asks for more searches"
-    return sample.rests, evidence, words
-
-
-def _counted(paths: PathCount) -> tuple[dict[str, Any], str]:
-    """Evidence of poses that were enumerated."""
+    subject: dict[str, Any]
+    l0 = None if lengths is None else checked_lengths(lengths, len(loaded.cables), loaded.name)
+    if l0 is not None and model == ELASTIC:
+        sample = sample_equilibria(
+            platform, l0, most=searches, seed=seed, starts=[platform.home], report=report
+        )
+        evidence: dict[str, Any] = {
+            "method": "multi-start", "complete": False, "searches": sample.searches,
+            "ended_at_rest": sample.ended,
+            "expected_in_all": sample.expected if np.isfinite(sample.expected) else None,
+            "covered_share_of_starts": sample.covered, "stopped_by_rule": sample.stopped,
+            "seed": seed,
+        }  # fmt: skip
+        return Equilibria(robot=loaded, model=model, platform=platform, lengths=l0,
+                          rests=sample.rests, evidence=evidence)  # fmt: skip
+    if l0 is not None:
+        every = enumerate_equilibria(platform, l0, report)
+        rests, paths, subject = every.rests, every.paths, {"taut_sets": every.sets}
+    else:
+        p_WP = np.asarray(position, float)
+        if p_WP.shape != (3,) or not np.all(np.isfinite(p_WP)):
+            raise EquilibriumError(f"position: found {position}; accepted: x, y, z [m]")
+        names = [cable.name for cable in loaded.cables]
+        chosen = names if taut is None else list(taut)
+        for name in chosen:
+            if name not in names:
+                raise EquilibriumError(f"taut: found {name!r}; {accepted_names(name, names)}")
+        held = enumerate_at_position(platform, p_WP, [names.index(name) for name in chosen])
+        rests, paths, subject = held.rests, held.paths, {"taut": chosen}
     evidence = {
         "method": "all complex solutions along paths, and closed forms",
         "complete": paths.lost == 0, "systems": paths.systems, "paths": paths.paths,
         "to_infinity": paths.away, "to_singular_solutions": paths.singular, "lost": paths.lost,
+        **subject,
     }  # fmt: skip
-    if paths.lost:
-        words = f"{paths.lost} of {paths.paths} paths lost: poses may be missing"
-    elif paths.paths:
-        words = f"all {paths.paths} paths to complex solutions ended: no isolated pose is missing"
-    else:
-        words = "closed form: no pose is missing"
-    if paths.singular and not paths.lost:
-        words += f", but where solutions meet ({paths.singular})"
-    return evidence, words
+    return Equilibria(robot=loaded, model=model, platform=platform, lengths=l0, rests=rests,
+                      evidence=evidence)  # fmt: skip

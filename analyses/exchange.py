@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cdpr_drake.analyses.frame.files import WrittenFiles, write_files
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import ModelWord, NewFolder, OutFolder, one_of
 from cdpr_drake.errors import RobotFileError
@@ -69,13 +69,9 @@ class ForeignModel(Result):
         head = {key: numbers.pop(key) for key in list(numbers)[:3]}  # name, format, source
         return {**head, "files": [str(path) for path in self.paths], **numbers}
 
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
-
     def lines(self) -> list[str]:
         """What it is, what was assumed, and the files that were written."""
-        made = self.model.completed
+        completed = self.model.completed
         if isinstance(self.model, ImportedMechanism):
             tree = self.model.tree
             words = (
@@ -87,8 +83,8 @@ class ForeignModel(Result):
             words = (
                 f"{robot.name}: {robot.motion}, {len(robot.cables)} cables, from {self.model.tool}"
             )
-        assumed = [f"  assumed {key}: {why}" for key, why in made.assumed.items()]
-        notes = [f"  note: {remark}" for remark in made.remarks]
+        assumed = [f"  assumed {key}: {why}" for key, why in completed.assumed.items()]
+        notes = [f"  note: {remark}" for remark in completed.remarks]
         return [words, *assumed, *notes, *map(str, self.paths)]
 
     def figures(self) -> dict[str, Callable[[], Figure]]:

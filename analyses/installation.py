@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import Annotated, Any
@@ -17,7 +17,7 @@ from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import default_workers, finished_jobs
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Listing, Result, Table
 from cdpr_drake.analyses.reporting.provenance import browser
 from cdpr_drake.errors import CdprError, StoppedError
 from cdpr_drake.kernel_cache.background import compile_needed
@@ -30,7 +30,7 @@ RENDER_TIMEOUT = 120.0
 
 @dataclass(frozen=True)
 class Finding:
-    """One check: what, whether it passed, what was found, and what to do if not."""
+    """One check: its name, whether it passed, its result in words, and what to do if not."""
 
     check: str
     passed: bool
@@ -55,23 +55,17 @@ def render_and_detect() -> str:
     detector = servo.diagram.GetSubsystemByName("detector")
     image = sensor.GetOutputPort("color_image").Eval(sensor.GetMyContextFromRoot(context))
     marks = detector.find_marks(detector.GetMyContextFromRoot(context))
-    seen = "tag found" if marks is not None else "tag NOT found"
-    return f"{image.width()} x {image.height()} image, {seen}"
+    words = "tag found" if marks is not None else "tag NOT found"
+    return f"{image.width()} x {image.height()} image, {words}"
 
 
-def _python() -> Finding:
-    found = ".".join(str(part) for part in sys.version_info[:3])
-    return Finding("Python", sys.version_info >= (3, 11), found, "install Python 3.11 or newer")
+GRAPHICS = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 
-
-def _package(name: str, module: str) -> Finding:
-    remedy = f"pip install --upgrade {name}"
-    try:
-        importlib.import_module(module)
-        return Finding(name, True, version(name))
-    except (ImportError, PackageNotFoundError) as problem:
-        return Finding(name, False, str(problem), remedy)
-
+PACKAGES = {
+    "drake": "pydrake", "numpy": "numpy", "scipy": "scipy", "numba": "numba",
+    "opencv-python-headless": "cv2", "matplotlib": "matplotlib",
+}  # fmt: skip
+"""Modules of the packages that everything needs."""
 
 EXTRAS = {
     "gymnasium": ("gym", "learning environments"), "nicegui": ("studio", "cdpr studio"),
@@ -83,6 +77,19 @@ EXTRAS = {
 """Packages that one part needs and the rest does without: their extra, and that part."""
 
 
+def _python() -> Finding:
+    release = ".".join(str(part) for part in sys.version_info[:3])
+    return Finding("Python", sys.version_info >= (3, 11), release, "install Python 3.11 or newer")
+
+
+def _package(name: str, module: str) -> Finding:
+    try:
+        importlib.import_module(module)
+        return Finding(name, True, version(name))
+    except (ImportError, PackageNotFoundError) as problem:
+        return Finding(name, False, str(problem), f"pip install --upgrade {name}")
+
+
 def _extra(name: str, extra: str, serves: str) -> Finding:
     """It is no fault that it is absent."""
     try:
@@ -90,6 +97,38 @@ def _extra(name: str, extra: str, serves: str) -> Finding:
     except PackageNotFoundError:
         remedy = f"pip install 'cdpr_drake[{extra}]'"
         return Finding(name, True, f"absent; for {serves}: {remedy}")
+
+
+def _aruco() -> Finding:
+    import cv2
+
+    present = hasattr(cv2, "aruco") and hasattr(cv2.aruco, "ArucoDetector")
+    remedy = "pip install --upgrade 'opencv-python-headless>=4.8', and remove other OpenCV packages"
+    words = "present" if present else "missing"
+    return Finding("OpenCV AprilTag detector", present, words, remedy)
+
+
+def _egl() -> Finding:
+    try:
+        check_rendering()
+    except CdprError as problem:
+        return Finding("EGL", False, str(problem), GRAPHICS)
+    return Finding("EGL", True, "libEGL loads")
+
+
+def _rendering() -> Finding:
+    """In a process of its own, since a broken graphics driver ends the process."""
+    check, remedy = "rendered camera", f"{GRAPHICS}, or use cdpr simulate --camera projected"
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _RENDER_PROGRAM], capture_output=True, text=True,
+            timeout=RENDER_TIMEOUT, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return Finding(check, False, f"nothing after {RENDER_TIMEOUT:g} s", remedy)
+    lines = (done.stdout if done.returncode == 0 else done.stderr).strip().splitlines()
+    words = lines[-1] if lines else f"ended with code {done.returncode}"
+    return Finding(check, done.returncode == 0 and words.endswith("tag found"), words, remedy)
 
 
 def _kernels() -> Finding:
@@ -105,86 +144,12 @@ def _browser() -> Finding:
     return Finding("browser", True, browser() or absent)
 
 
-def _aruco() -> Finding:
-    import cv2
-
-    found = hasattr(cv2, "aruco") and hasattr(cv2.aruco, "ArucoDetector")
-    remedy = "pip install --upgrade 'opencv-python-headless>=4.8', and remove other OpenCV packages"
-    return Finding("OpenCV AprilTag detector", found, "present" if found else "missing", remedy)
-
-
-def _egl() -> Finding:
-    try:
-        check_rendering()
-    except CdprError as problem:
-        return Finding("EGL", False, str(problem), "apt-get install libegl1 libgl1 libgl1-mesa-dri")
-    return Finding("EGL", True, "libEGL loads")
-
-
-def _rendering() -> Finding:
-    """In a process of its own, since a broken graphics driver ends the process."""
-    remedy = (
-        "apt-get install libegl1 libgl1 libgl1-mesa-dri, or use cdpr simulate --camera projected"
-    )
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", _RENDER_PROGRAM],
-            capture_output=True,
-            text=True,
-            timeout=RENDER_TIMEOUT,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return Finding("rendered camera", False, f"nothing after {RENDER_TIMEOUT:g} s", remedy)
-    lines = (done.stdout if done.returncode == 0 else done.stderr).strip().splitlines()
-    said = lines[-1] if lines else f"ended with code {done.returncode}"
-    passed = done.returncode == 0 and said.endswith("tag found")
-    return Finding("rendered camera", passed, said, remedy)
-
-
 CHECKS: tuple[Callable[[], Finding], ...] = (
     _python,
-    lambda: _package("drake", "pydrake"),
-    lambda: _package("numpy", "numpy"),
-    lambda: _package("scipy", "scipy"),
-    lambda: _package("numba", "numba"),
-    lambda: _package("opencv-python-headless", "cv2"),
-    lambda: _package("matplotlib", "matplotlib"),
-    _aruco,
-    _egl,
-    _rendering,
-    _kernels,
-    _browser,
+    *(partial(_package, *words) for words in PACKAGES.items()),
+    _aruco, _egl, _rendering, _kernels, _browser,
     *(partial(_extra, name, *words) for name, words in EXTRAS.items()),
-)
-
-
-@dataclass(frozen=True, repr=False)
-class Examination(Result):
-    """What this machine has and lacks.
-
-    Attributes:
-        findings: One of each check; where one fails the rest still run.
-    """
-
-    findings: Sequence[Finding]
-
-    def as_dict(self) -> list[dict[str, Any]]:
-        """A list, an entry for each check."""
-        return [asdict(finding) for finding in self.findings]
-
-    def tables(self) -> list[Table]:
-        """A row for each check."""
-        rows = [
-            (finding.check, "ok" if finding.passed else "missing", finding.found, finding.remedy)
-            for finding in self.findings
-        ]
-        return [Table("cdpr doctor", ("check", "", "found", "remedy"), rows)]
-
-    @property
-    def exit_code(self) -> int:
-        """1 if something is missing."""
-        return 0 if all(finding.passed for finding in self.findings) else 1
+)  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -203,10 +168,6 @@ class Compilation(Result):
         """For JSON."""
         return {"steps": list(self.steps), "wall_time_s": self.seconds}
 
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
-
     def notes(self) -> list[str]:
         """How long it took."""
         return [f"Kernels are compiled and kept; that took {self.seconds:.0f} s."]
@@ -215,7 +176,7 @@ class Compilation(Result):
 def examine_installation(
     *, compile_all: Annotated[bool, Parameter(name="--compile", negative=())] = False,
     follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
-) -> Examination | Compilation:  # fmt: skip
+) -> Listing | Compilation:  # fmt: skip
     """Checks what this machine has and names the remedy; exit code 1 if something is missing.
 
     Args:
@@ -227,10 +188,15 @@ def examine_installation(
         StoppedError: It was stopped; what is compiled is kept.
     """
     if not compile_all:
-        findings = (check() for check in CHECKS)
-        return Examination([
-            replace(finding, remedy="") if finding.passed else finding for finding in findings
-        ])  # fmt: skip
+        findings = [check() for check in CHECKS]  # where one fails the rest still run
+        entries = [asdict(each) | ({"remedy": ""} if each.passed else {}) for each in findings]
+        rows = [
+            (entry["check"], "ok" if entry["passed"] else "missing", entry["found"],
+             entry["remedy"])
+            for entry in entries
+        ]  # fmt: skip
+        table = Table("cdpr doctor", ("check", "", "found", "remedy"), rows)
+        return Listing(entries, table, code=0 if all(each.passed for each in findings) else 1)
     names, began = [LISTED, *(name for name, _ in compilation_steps())], time.perf_counter()
     count = Count(follow, len(names), unit="steps")
     for job in finished_jobs(compile_step, names, default_workers(), stop=follow.stop):
@@ -263,19 +229,19 @@ def compilation_steps() -> list[tuple[str, Callable[[], None]]]:
         scenario_names,
     )
 
-    servos = sorted(scenario_names(VISUAL_SERVO), key=lambda name: name != "acrobot_pbvs")
-    projected, compiled = "camera.kind=projected", "integration.engine=compiled"
-    steps: list[tuple[str, Callable[[], None]]] = [("tension methods", _distribute)]
-    for name in servos:
-        steps.append((name, partial(_simulate, name, (projected,))))
-        if name == "acrobot_pbvs":
-            more = (projected, compiled)
-            steps.append((f"{name}, compiled engine", partial(_simulate, name, more)))
-    for kind in (TENSION_CONTROL, MECHANISM):
-        steps += [(name, partial(_simulate, name, ())) for name in scenario_names(kind)]
-    steps += [
-        (name, partial(_simulate, name, (projected,))) for name in scenario_names(PICK_AND_PLACE)
-    ]
+    default, projected = "acrobot_pbvs", "camera.kind=projected"
+    steps: list[tuple[str, Callable[[], None]]] = [
+        ("tension methods", _distribute),
+        (default, partial(_simulate, default, projected)),
+        (f"{default}, compiled engine",
+         partial(_simulate, default, projected, "integration.engine=compiled")),
+    ]  # fmt: skip
+    for kind in (VISUAL_SERVO, TENSION_CONTROL, MECHANISM, PICK_AND_PLACE):
+        overrides = [projected] if kind in (VISUAL_SERVO, PICK_AND_PLACE) else []
+        steps += [
+            (name, partial(_simulate, name, *overrides))
+            for name in scenario_names(kind) if name != default
+        ]  # fmt: skip
     return steps
 
 
@@ -303,7 +269,7 @@ def _distribute() -> None:
     solve_tensions("acrobot_large", method=ALL)
 
 
-def _simulate(name: str, overrides: Sequence[str]) -> None:
+def _simulate(name: str, *overrides: str) -> None:
     from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
     from cdpr_drake.systems.diagrams.load import load_scenario
 

@@ -63,11 +63,9 @@ class CableLengths(Result):
         """A row for each cable."""
         place = numbers(self.X_WP.translation())
         title = f"Cables of {self.robot.name} at ({place}) m, {self.geometry}"
+        each = zip(self.robot.cables, self.lengths, self.directions.T, strict=True)
         rows = [
-            (cable.name, f"{length:.5f}", *(f"{x:.4f}" for x in u))
-            for cable, length, u in zip(
-                self.robot.cables, self.lengths, self.directions.T, strict=True
-            )
+            (cable.name, f"{length:.5f}", *(f"{x:.4f}" for x in u)) for cable, length, u in each
         ]
         return [Table(title, ("cable", "length [m]", "u_x", "u_y", "u_z"), rows)]
 
@@ -164,13 +162,10 @@ class PoseFromLengths(Result):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The robot at the pose."""
-        return {"pose": self._draw}
-
-    def _draw(self) -> Figure:
         from cdpr_drake.analyses.visualization.path_figures import poses_figure
 
         title = f"{self.robot.name}: pose from cable lengths, {self.geometry}"
-        return poses_figure(title, self.robot, {"platform": self.X_WP})
+        return {"pose": lambda: poses_figure(title, self.robot, {"platform": self.X_WP})}
 
 
 @verb()

@@ -50,22 +50,22 @@ class PlacedMechanism:
         """Its joints that move, by scoped name; those of free bodies bear the bodies' names."""
         plant = self.plant
         joints = (plant.get_joint(JointIndex(i)) for i in plant.GetJointIndices())
-        return {scoped_joint(plant, one): one for one in joints if one.num_velocities()}
+        return {scoped_joint(plant, joint): joint for joint in joints if joint.num_velocities()}
 
     def positions(self, q: Array) -> dict[str, list[float]]:
         """Positions of each joint, of a free body x, y, z, phi, theta, psi [m, rad]."""
         plant, context = self.plant, self.plant.CreateDefaultContext()
         plant.SetPositions(context, q)
-        found = {}
+        positions = {}
         for name, joint in self.joints().items():
             if joint.type_name() == "quaternion_floating":
                 X = plant.EvalBodyPoseInWorld(context, joint.child_body())
                 angles = angles_from_rotation(X.rotation())
-                found[name] = (np.concatenate([X.translation(), angles]) + 0.0).tolist()
+                positions[name] = (np.concatenate([X.translation(), angles]) + 0.0).tolist()
             else:
                 start = joint.position_start()
-                found[name] = q[start : start + joint.num_positions()].tolist()
-        return found
+                positions[name] = q[start : start + joint.num_positions()].tolist()
+        return positions
 
     def rows(self) -> tuple[tuple[str, ...], Array]:
         """What each velocity's force is, in words, and whether it is a moment, shape (nv,)."""

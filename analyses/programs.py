@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import cdpr_drake
 from cdpr_drake.analyses.frame.files import copy_new
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Listing, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import OutFolder, one_of
 from cdpr_drake.errors import CdprError
@@ -25,36 +24,16 @@ ALL = "all"
 """In the place of an example: each."""
 
 
-@dataclass(frozen=True, repr=False)
-class Programs(Result):
-    """Notebooks or examples of the package.
-
-    Attributes:
-        kind: What they are.
-        titles: First line of each by name.
-        copied: What was copied, a line each; None: nothing was asked to be.
-    """
-
-    kind: str
-    titles: Mapping[str, str]
-    copied: Sequence[str] | None = None
-
-    def as_dict(self) -> list[dict[str, str]]:
-        """A list of names and titles."""
-        return [{"name": name, "title": title} for name, title in self.titles.items()]
-
-    def tables(self) -> list[Table]:
-        """The list, if nothing was copied."""
-        rows = list(self.titles.items())
-        return [] if self.copied is not None else [Table(self.kind, ("name", "title"), rows)]
-
-    def lines(self) -> Sequence[str]:
-        """What was copied."""
-        return self.copied or ()
+def _listed(titles: Mapping[str, str], kind: str, copied: Sequence[str] | None = None) -> Listing:
+    """Programs by their titles; a table only if none was copied."""
+    entries = [{"name": name, "title": title} for name, title in titles.items()]
+    if copied is not None:
+        return Listing(entries, words=copied)
+    return Listing(entries, Table(kind, ("name", "title"), list(titles.items())))
 
 
 @verb()
-def copy_notebooks(folder: Path | None = None, /) -> Programs:
+def copy_notebooks(folder: Path | None = None, /) -> Listing:
     """Copies the notebooks to a folder, or lists them; never overwrites a file.
 
     Args:
@@ -67,10 +46,10 @@ def copy_notebooks(folder: Path | None = None, /) -> Programs:
     contents = {path.name: path.read_bytes() for path in paths}
     titles = {name: _notebook_title(name, words) for name, words in contents.items()}
     if folder is None:
-        return Programs("Notebooks", titles)
+        return _listed(titles, "Notebooks")
     count = len(copy_new(contents, folder))
     words = f"{folder}: {count} copied, {len(contents) - count} were there"
-    return Programs("Notebooks", titles, [f"{words}; begin with tour.ipynb"])
+    return _listed(titles, "Notebooks", [f"{words}; begin with tour.ipynb"])
 
 
 def _notebook_title(name: str, content: bytes) -> str:
@@ -90,7 +69,7 @@ def example_names() -> list[str]:
 def copy_examples(
     name: Annotated[str | None, one_of([*example_names(), ALL])] = None, /, *,
     out: OutFolder = None,
-) -> Programs:  # fmt: skip
+) -> Listing:  # fmt: skip
     """Lists short programs to start from, or copies one; never overwrites a file.
 
     Args:
@@ -106,11 +85,11 @@ def copy_examples(
     names = [name] if name is not None and name != ALL else example_names()
     titles = {each: _example_title(each) for each in names}
     if name is None:
-        return Programs("Examples", titles)
+        return _listed(titles, "Examples")
     folder = out or Path()
     contents = {f"{each}.py": (EXAMPLES / f"{each}.py").read_bytes() for each in names}
     copy_new(contents, folder)
-    return Programs("Examples", titles, [str(folder / file) for file in contents])
+    return _listed(titles, "Examples", [str(folder / file) for file in contents])
 
 
 def _example_title(name: str) -> str:

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.files import WrittenFiles, write_files
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import NewFolder, RobotWord, one_of
 from cdpr_drake.analyses.programs import NOTEBOOKS
@@ -179,10 +179,6 @@ class FileSchema(Result):
     def as_dict(self) -> dict[str, Any]:
         """The schema."""
         return self.schema
-
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
 
     def lines(self) -> list[str]:
         """The schema as JSON."""

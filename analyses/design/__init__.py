@@ -7,10 +7,10 @@ motor changed.
 * `MovedPoints` makes displacements of points of the vector.
 * `GOALS` is the table of what may be wanted; volumes are shares of a grid of poses and steer the
   search only.
-* `EvolutionSearch` seeks the vector of the largest score by CMA-ES, which needs no gradients:
-  shares of poses are steps of the coordinates.
-* `SlopeSearch` seeks the largest least of smooth functions by their slopes, which takes far fewer
-  designs where a goal is such a least.
+* `evolve` seeks the vector of the largest score by CMA-ES, which needs no gradients: shares of
+  poses are steps of the coordinates.
+* `climb` seeks the largest least of smooth functions by their slopes, which takes far fewer designs
+  where a goal is such a least.
 * `pareto_front` says which designs no other one is better than, where several values are wanted.
 * `confirm` says what was gained, and knows nothing of the search: by boxes proven inside the
   workspace, or poses proven stable on another grid.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cdpr_drake.analyses.design.settings import AXES, DesignSettings, MovedSettings
+from cdpr_drake.analyses.design.settings import AXES, DesignSettings
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_text
@@ -75,7 +75,7 @@ class MovedPoints:
         for k in range(3 * m):
             first, s = root(k)
             groups.setdefault(first, []).append((k, s))
-        self._columns: list[Array] = []
+        columns = []
         for first, members in groups.items():
             half = min(self.reach[k % 3, k // 3] for k, _ in members)
             if first in still or half <= 0.0:
@@ -83,7 +83,8 @@ class MovedPoints:
             column = np.zeros(3 * m)
             for k, s in members:
                 column[k] = s * half
-            self._columns.append(column.reshape(m, 3).T)
+            columns.append(column.reshape(m, 3).T)
+        self._columns = np.array(columns).reshape(-1, 3, m)
 
     @property
     def size(self) -> int:
@@ -92,19 +93,12 @@ class MovedPoints:
 
     def displacements(self, coordinates: Array) -> Array:
         """Displacements, shape (3, m) [m]; those of coordinates of 0.5 are zero."""
-        moved = np.zeros_like(self.reach)
-        for value, column in zip(coordinates, self._columns, strict=True):
-            moved += (2.0 * value - 1.0) * column
-        return moved
+        return np.tensordot(2.0 * np.asarray(coordinates) - 1.0, self._columns, 1)
 
     def slopes(self, by_points: Array) -> Array:
-        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points.
-
-        Args:
-            by_points: Shape (n, 3, m) [1/m].
-        """
-        columns = np.array(self._columns).reshape(-1, *self.reach.shape)
-        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, columns))
+        """Slopes by the coordinates, shape (n, size), of functions with slopes by the points, shape
+        (n, 3, m) [1/m]."""
+        return np.asarray(2.0 * np.einsum("nam,kam->nk", by_points, self._columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +155,10 @@ class Candidates:
         return parse_robot(self.robot_text(number, coordinates), Path("design"))
 
 
-def make_candidates(robot_name: str, settings: DesignSettings, source: str) -> Candidates:
-    """What a robot may become.
+def make_candidates(
+    robot_name: str, settings: DesignSettings, source: str = "design"
+) -> Candidates:
+    """The designs that a robot may become.
 
     Args:
         robot_name: Robot by name, or path of a robot file.
@@ -176,78 +172,59 @@ def make_candidates(robot_name: str, settings: DesignSettings, source: str) -> C
     names = [cable.name for cable in robot.cables]
     m = len(names)
 
-    def number(name: str, where: str) -> int:
-        if name not in names:
-            raise DesignError(f"{source}: {where}: {name!r} is unknown; {closest(name, names)}")
-        return names.index(name)
+    def refuse(where: str, words: str) -> DesignError:
+        return DesignError(f"{source}: {where}: {words}")
 
-    def reach(moved: MovedSettings, where: str) -> Array:
-        chosen = [number(name, f"{where}.cables") for name in moved.cables] or range(m)
-        half = np.zeros((3, m))
-        half[:, list(chosen)] = moved.reach[:, np.newaxis]
-        return half
+    def numbers(chosen: Sequence[str], where: str) -> list[int]:
+        for name in chosen:
+            if name not in names:
+                raise refuse(where, f"{name!r} is unknown; {closest(name, names)}")
+        return [names.index(name) for name in chosen]
 
-    half = np.hstack(
-        [reach(settings.exit_points, "exit_points"), reach(settings.anchor_points, "anchor_points")]
-    )
+    half = np.zeros((3, 2 * m))
+    for first, moved, where in (
+        (0, settings.exit_points, "exit_points.cables"),
+        (m, settings.anchor_points, "anchor_points.cables"),
+    ):
+        chosen = numbers(moved.cables, where) or range(m)
+        half[:, [first + k for k in chosen]] = moved.reach[:, np.newaxis]
     if robot.is_planar() and np.any(half[2] > 0.0):
-        raise DesignError(
-            f"{source}: exit_points.reach, anchor_points.reach: found moves along z of the planar "
-            f"{robot.name}; accepted: 0 along z"
-        )
+        raise refuse("exit_points.reach, anchor_points.reach", "found moves along z of the planar "
+                     f"{robot.name}; accepted: 0 along z")  # fmt: skip
     mirrors = []
     for k, mirror in enumerate(settings.mirrors):
-        where, axes = f"mirrors[{k}].pairs", AXES[mirror.axis]
+        where = f"mirrors[{k}].pairs"
         for pair in mirror.pairs:
-            first, dash, second = pair.partition("-")
-            if not dash:
-                raise DesignError(f"{source}: {where}: found {pair!r}; accepted: such as C1-C4")
-            a, b = number(first.strip(), where), number(second.strip(), where)
+            if "-" not in pair:
+                raise refuse(where, f"found {pair!r}; accepted: such as C1-C4")
+            a, b = numbers([name.strip() for name in pair.split("-", 1)], where)
+            axes = AXES[mirror.axis]
             mirrors += [Mirror(axes, a, b), Mirror(axes, m + a, m + b)]
-    cable_sets = _cable_sets(settings.cables, names, source)
-    ranges = _ranges(robot, settings, source)
-    candidates = Candidates(robot_text(robot_name), cable_sets, MovedPoints(half, mirrors), ranges)
-    if candidates.size == 0 and len(cable_sets) < 2:
+    cable_sets = []
+    for k, words in enumerate(settings.cables):
+        chosen = numbers([name.strip() for name in words.split(",")], f"cables[{k}]")
+        if not LEAST_CABLES <= len(set(chosen)) == len(chosen) <= MOST_CABLES:
+            raise refuse(f"cables[{k}]", f"found {words!r}; accepted: {LEAST_CABLES} to "
+                         f"{MOST_CABLES} different cables")  # fmt: skip
+        cable_sets.append(tuple(sorted(chosen)))
+    ranges = {
+        name: (float(values[0]), float(values[1]))
+        for name in WINCH
+        if (values := getattr(settings.winch, name)) is not None
+    }
+    for name, (low, high) in ranges.items():
+        if not low < high:
+            raise refuse(f"winch.{name}", f"found {low:g} to {high:g}; accepted: least < largest")
+    if ranges and robot.winch.motor_torque is None and "motor_torque" not in ranges:
+        raise refuse("winch", f"found no motor_torque of {robot.name}, from which tensions follow; "
+                     "accepted: a range of it")  # fmt: skip
+    candidates = Candidates(
+        robot_text(robot_name), tuple(cable_sets) or (tuple(range(m)),), MovedPoints(half, mirrors),
+        ranges,
+    )  # fmt: skip
+    if candidates.size == 0 and len(candidates.cable_sets) < 2:
         raise DesignError(
             f"{source}: found nothing that may change; accepted: a reach above 0, ranges of the "
             "winch, or several sets of cables"
         )
     return candidates
-
-
-def _cable_sets(sets: Sequence[str], names: list[str], source: str) -> tuple[tuple[int, ...], ...]:
-    result = []
-    for k, words in enumerate(sets):
-        chosen = [word.strip() for word in words.split(",")]
-        for name in chosen:
-            if name not in names:
-                raise DesignError(
-                    f"{source}: cables[{k}]: {name!r} is unknown; {closest(name, names)}"
-                )
-        if not LEAST_CABLES <= len(set(chosen)) == len(chosen) <= MOST_CABLES:
-            raise DesignError(
-                f"{source}: cables[{k}]: found {words!r}; accepted: {LEAST_CABLES} to "
-                f"{MOST_CABLES} different cables"
-            )
-        result.append(tuple(sorted(names.index(name) for name in chosen)))
-    return tuple(result) or (tuple(range(len(names))),)
-
-
-def _ranges(robot: Robot, settings: DesignSettings, source: str) -> dict[str, tuple[float, float]]:
-    ranges = {}
-    for name in WINCH:
-        values = getattr(settings.winch, name)
-        if values is None:
-            continue
-        low, high = (float(value) for value in values)
-        if not low < high:
-            raise DesignError(
-                f"{source}: winch.{name}: found {low:g} to {high:g}; accepted: least < largest"
-            )
-        ranges[name] = (low, high)
-    if ranges and robot.winch.motor_torque is None and "motor_torque" not in ranges:
-        raise DesignError(
-            f"{source}: winch: found no motor_torque of {robot.name}, from which tensions follow; "
-            "accepted: a range of it"
-        )
-    return ranges

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -29,9 +30,6 @@ EXIT_ERROR = 1e-3
 
 ACCURACY_POSES = 9
 """Poses at which accuracy is asked for: the first, the last, and some evenly between them."""
-
-SERVO_VERDICT = "certified"
-"""How stability is judged: proven, pose by pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,57 +69,42 @@ class Goal:
     proven_as: str = ""
 
 
-def _arrays(robot: Robot, judging: GoalContext, name: str) -> Array:
-    """A kind (as 0 and 1) or measure at all poses of the grid."""
+def _over_poses(
+    robot: Robot, judging: GoalContext, name: str, combine: Callable[[Array], float]
+) -> float:
+    """Mean or least of a kind (as 0 and 1) or measure, which counts 0 where it makes no sense."""
     about = pose_conditions(robot, required=judging.required)
     arrays = conditions_at(about, judging.grid, [name], 0, judging.grid.size)
-    return np.asarray(arrays[name], float)
+    values = np.asarray(arrays[name], float)
+    return float(combine(np.where(np.isfinite(values), values, 0.0)))
 
 
-def _share(name: str) -> Value:
-    return lambda robot, judging: float(np.mean(_arrays(robot, judging, name)))
+def _share(name: str, proven: bool = False) -> Goal:
+    """Share of the poses that are of a kind."""
+    title = f"share of poses: {KINDS[name].title}"
+    value = partial(_over_poses, name=name, combine=np.mean)
+    return Goal(title, "-", value, proven_as=name if proven else "")
 
 
-def _least(name: str) -> Value:
-    """Least over the poses; a pose at which the measure makes no sense has none: 0 or less."""
-
-    def value(robot: Robot, judging: GoalContext) -> float:
-        values = _arrays(robot, judging, name)
-        return float(np.min(np.where(np.isfinite(values), values, 0.0)))
-
-    return value
+def _least(name: str) -> Goal:
+    """Least of a measure over the poses."""
+    value = partial(_over_poses, name=name, combine=np.min)
+    return Goal(f"least {MEASURES[name].title}", MEASURES[name].unit, value)
 
 
-def _mean(name: str) -> Value:
-    def value(robot: Robot, judging: GoalContext) -> float:
-        values = _arrays(robot, judging, name)
-        return float(np.mean(np.where(np.isfinite(values), values, 0.0)))
-
-    return value
-
-
-def servo_stable(robot: Robot, judging: GoalContext, verdict: str) -> np.ndarray:
-    """At which poses the platform can be held and position-based servoing is stable, shape (n,).
-
-    Args:
-        robot: The robot.
-        judging: Poses and bounds.
-        verdict: One of `stability.verdict.VERDICTS`; certified: proven.
-    """
+def servo_stable(robot: Robot, judging: GoalContext) -> np.ndarray:
+    """At which poses the platform can be held and position-based servoing is proven stable, shape
+    (n,)."""
     grid = judging.grid
     case = stability_case(robot, "pbvs", grid)
     rows = grid.pose_rows(0, grid.size)
     options = VerdictOptions(margins=False)
-    stable = judge_stability(case, judging.bounds, rows, verdict, options).stable
+    stable = judge_stability(case, judging.bounds, rows, "certified", options).stable
     about = pose_conditions(robot)
     held = statically_feasible(
         about.case, grid.positions(0, grid.size), grid.rotations(0, grid.size)
     )
     return np.asarray(stable & held, bool)
-
-
-def _control_stability(robot: Robot, judging: GoalContext) -> float:
-    return float(np.mean(servo_stable(robot, judging, SERVO_VERDICT)))
 
 
 def _accuracy(robot: Robot, judging: GoalContext) -> float:
@@ -150,31 +133,27 @@ def _power(robot: Robot, judging: GoalContext) -> float:
 
 GOALS: dict[str, Goal] = {
     **{
-        name: Goal(
-            f"share of poses: {KINDS[name].title}",
-            "-",
-            _share(name),
-            proven_as=name if name in proven else "",
-        )
-        for proven in [("static", "wrench-feasible", "wrench-closure", "interference-free")]
-        for name in (*proven, "statically-stable", "singularity-free")
+        name: _share(name, proven=True)
+        for name in ("static", "wrench-feasible", "wrench-closure", "interference-free")
     },
-    "csw": Goal("share of poses: held, and the visual servo is stable", "-", _control_stability),
+    **{name: _share(name) for name in ("statically-stable", "singularity-free")},
+    "csw": Goal(
+        "share of poses: held, and the visual servo is stable", "-",
+        lambda robot, judging: float(np.mean(servo_stable(robot, judging))),
+    ),
     **{
-        name: Goal(f"least {MEASURES[name].title}", MEASURES[name].unit, _least(name))
+        name: _least(name)
         for name in ("capacity-margin", "stiffness", "frequency", "dexterity", "clearance")
     },
-    "survives": Goal(
-        f"share of poses: {KINDS['single-failure'].title}",
-        "-",
-        _share("single-failure"),
-        proven_as="single-failure",
-    ),
+    "survives": _share("single-failure", proven=True),
     "breaks-survived": Goal(
-        "mean number of single breaks after which the weight is held", "-", _mean("breaks-survived")
+        "mean number of single breaks after which the weight is held", "-",
+        partial(_over_poses, name="breaks-survived", combine=np.mean),
     ),
-    "tension-factor": Goal("mean tension factor", "-", _mean("tension-factor")),
-    "payload": Goal("least payload", "kg", _least("payload")),
+    "tension-factor": Goal(
+        "mean tension factor", "-", partial(_over_poses, name="tension-factor", combine=np.mean)
+    ),
+    "payload": Goal("least payload", "kg", _least("payload").value),
     "accuracy": Goal(
         "rms error of the position, exit points off by 1 mm", "m", _accuracy, smaller=True
     ),
@@ -183,7 +162,7 @@ GOALS: dict[str, Goal] = {
     "cables": Goal(
         "number of cables", "-", lambda robot, _: float(len(robot.cables)), smaller=True
     ),
-}
+}  # fmt: skip
 """Goals by name."""
 
 
@@ -228,8 +207,11 @@ def check_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> Non
         )
 
 
-def evaluate_goals(robot: Robot, judging: GoalContext, names: tuple[str, ...]) -> Array:
+def goal_signs(names: Sequence[str]) -> Array:
+    """1 of goals of which more is better, -1 of others, shape (n,)."""
+    return np.array([-1.0 if GOALS[name].smaller else 1.0 for name in names])
+
+
+def evaluate_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> Array:
     """Values of goals, larger is better: those of which less is better with the sign changed."""
-    values = [GOALS[name].value(robot, judging) for name in names]
-    signs = [-1.0 if GOALS[name].smaller else 1.0 for name in names]
-    return np.array(values) * signs
+    return np.array([GOALS[name].value(robot, judging) for name in names]) * goal_signs(names)

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,13 +20,8 @@ from cyclopts import Parameter
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import BOXES, Confirmation, confirm
-from cdpr_drake.analyses.design.goals import GOALS
-from cdpr_drake.analyses.design.search import (
-    DesignSearch,
-    goal_context,
-    search_arguments,
-    search_design,
-)
+from cdpr_drake.analyses.design.goals import GOALS, goal_signs
+from cdpr_drake.analyses.design.search import DesignSearch, goal_context, search_design
 from cdpr_drake.analyses.design.settings import (
     SEARCHES,
     DesignSettings,
@@ -35,8 +29,8 @@ from cdpr_drake.analyses.design.settings import (
     load_design_settings,
 )
 from cdpr_drake.analyses.frame.folder import Folder
-from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
     Formats,
@@ -49,7 +43,7 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.planning.plans import written
-from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
@@ -69,9 +63,6 @@ REACH = 0.1
 """Without parameters exit points move so far, either way along each axis that they can [m]."""
 
 QUICK_GENERATIONS, QUICK_BOXES = 3, 2000
-
-INTERRUPTED = 130
-"""Exit code of a search that was stopped."""
 
 
 def goal_of(word: str) -> GoalSettings:
@@ -134,7 +125,7 @@ class Design(Result):
     @property
     def exit_code(self) -> int:
         """Of a stopped search."""
-        return INTERRUPTED if self.interrupted else 0
+        return STOPPED if self.interrupted else 0
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON: goals of robot, best design and front, and what was confirmed."""
@@ -172,25 +163,27 @@ class Design(Result):
     def tables(self) -> list[Table]:
         """Goals of the robot and of the best design, and what is proven of both."""
         search, best = self.search, self.search.best
-        rows = []
-        for k, name in enumerate(search.names):
-            sign = -1.0 if GOALS[name].smaller else 1.0
-            after = "-" if best is None else f"{sign * search.values[best, k]:.5g}"
-            rows.append((name, GOALS[name].unit, f"{sign * search.original[k]:.5g}", after))
+        signs = goal_signs(search.names)
+        before = [f"{value:.5g}" for value in signs * search.original]
+        after = ["-"] * len(signs)
+        if best is not None:
+            after = [f"{value:.5g}" for value in signs * search.values[best]]
+        units = [GOALS[name].unit for name in search.names]
         title = (
             f"{self.robot}, {self.geometry}: goals on the search's grid, {len(search.values)} "
             "designs"
         )
-        goals = Table(title, ("goal", "unit", "robot", "best design"), rows)
-        if not self.confirmed:
-            return [goals]
-        headings = ("goal", "robot", "best design", "unit", "open", "gain", "how")
-        return [goals, Table("Proven of both, not by the search", headings, [
-            (proof.goal, f"{proof.original:.5g}", f"{proof.design:.5g}", proof.unit,
-             f"{proof.original_open:.3g}, {proof.design_open:.3g}",
-             "-" if proof.gain is None else f"{100.0 * proof.gain:+.1f} %", proof.method)
-            for proof in self.confirmed
-        ])]  # fmt: skip
+        rows = list(zip(search.names, units, before, after, strict=True))
+        tables = [Table(title, ("goal", "unit", "robot", "best design"), rows)]
+        if self.confirmed:
+            headings = ("goal", "robot", "best design", "unit", "open", "gain", "how")
+            tables.append(Table("Proven of both, not by the search", headings, [
+                (proof.goal, f"{proof.original:.5g}", f"{proof.design:.5g}", proof.unit,
+                 f"{proof.original_open:.3g}, {proof.design_open:.3g}",
+                 "-" if proof.gain is None else f"{100.0 * proof.gain:+.1f} %", proof.method)
+                for proof in self.confirmed
+            ]))  # fmt: skip
+        return tables
 
     def lines(self) -> list[str]:
         """Where results are."""
@@ -200,12 +193,102 @@ class Design(Result):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """How the score rose; what goals cost each other; which points moved."""
-        figures: dict[str, Callable[[], Figure]] = {"progress": partial(_progress, self)}
+        figures = {"progress": self._progress}
         if len(self.search.names) > 1:
-            figures["pareto"] = partial(_pareto, self)
+            figures["pareto"] = self._pareto
         if self.search.best is not None:
-            figures["points"] = partial(_points, self)
+            figures["points"] = self._points
         return figures
+
+    def _progress(self) -> Figure:
+        from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+
+        search = self.search
+        figure, axes = new_figure(1, 1, (7.5, 5.0), f"{self.robot}: search")
+        for number, cables in enumerate(search.candidates.cable_sets):
+            scores = search.scores[search.sets == number]
+            if not len(scores):
+                continue
+            look, index = nth_look(number), np.arange(1, len(scores) + 1)
+            axes.plot(index, scores, ".", color=look.color, markersize=3, alpha=0.5)
+            axes.step(
+                index, np.fmax.accumulate(scores), where="post", color=look.color,
+                linestyle=look.dash, label=f"best, {len(cables)} cables",
+            )  # fmt: skip
+        weights = np.array([goal.weight for goal in search.settings.goals])
+        original = np.where(np.isfinite(search.original), np.sign(search.original), 0.0) @ weights
+        axes.axhline(original, **line_style(IDEAL), label="robot as it is")
+        axes.set(xlabel="designs judged", ylabel="score (robot as it is: 1 for each weight)")
+        axes.legend(loc="lower right")
+        return figure
+
+    def _pareto(self) -> Figure:
+        from cdpr_drake.analyses.visualization.figure_style import new_figure
+
+        search, signs, look = self.search, goal_signs(self.search.names), nth_look(1)
+        pairs = list(pairwise(range(len(signs))))
+        title = f"{self.robot}: what goals cost each other"
+        figure, panels = new_figure(1, len(pairs), (6.5 * len(pairs), 5.5), title)
+        values, original = search.values * signs, search.original * signs
+        labels = [
+            name + ("" if GOALS[name].unit == "-" else f" [{GOALS[name].unit}]")
+            + (", less is better" if GOALS[name].smaller else "")
+            for name in search.names
+        ]  # fmt: skip
+        for axes, (x, y) in zip(np.atleast_1d(panels), pairs, strict=True):
+            axes.plot(
+                values[:, x], values[:, y], ".", color="#a0a0a0", markersize=3, label="designs"
+            )
+            front = search.front[np.argsort(values[search.front, x])]
+            axes.plot(
+                values[front, x], values[front, y], linestyle=look.dash, marker=look.marker,
+                color=look.color, markersize=6, label="no other is better in everything",
+            )  # fmt: skip
+            axes.plot(
+                original[x], original[y], "*", color="black", markersize=14, label="robot as it is"
+            )
+            if search.best is not None:
+                best = values[search.best]
+                axes.plot(
+                    best[x], best[y], "D", markerfacecolor="none", markeredgecolor=PLATFORM.color,
+                    markeredgewidth=2, markersize=11, label="best score",
+                )  # fmt: skip
+            axes.set(xlabel=labels[x], ylabel=labels[y])
+            axes.legend(loc="best")
+        return figure
+
+    def _points(self) -> Figure:
+        from cdpr_drake.analyses.visualization.figure_style import few_ticks, new_figure
+
+        search = self.search
+        assert search.best is not None
+        figure, panels = new_figure(1, 2, (12.0, 5.5), f"{self.robot}: points moved")
+        before = parse_robot(search.candidates.text, Path("robot"))
+        after = search.candidates.robot(search.sets[search.best], search.coordinates[search.best])
+        cables = list(search.candidates.cable_sets[search.sets[search.best]])
+        for axes, kind, frame, old, new in (
+            (panels[0], "exit", "W", before.exit_points(), after.exit_points()),
+            (panels[1], "anchor", "P", before.anchor_points(), after.anchor_points()),
+        ):
+            axes.plot(*old[:2], "o", markerfacecolor="none", color="black", label="robot as it is")
+            axes.plot(*new[:2], "s", color=nth_look(0).color, markersize=5, label="best design")
+            places: dict[tuple[float, ...], list[str]] = {}
+            for k, i in enumerate(cables):
+                axes.plot(*np.array([old[:2, i], new[:2, k]]).T, "-", color="#707070", lw=1)
+                places.setdefault(tuple(old[:2, i].tolist()), []).append(before.cables[i].name)
+            for (x, y), names in places.items():
+                axes.annotate(
+                    ", ".join(names), (x, y), textcoords="offset points",
+                    xytext=(-12 if x > 0.0 else 8, -14 if y > 0.0 else 8),
+                    ha="right" if x > 0.0 else "left",
+                )  # fmt: skip
+            few_ticks(axes.xaxis)
+            axes.set(
+                xlabel=f"x in {frame} [m]", ylabel=f"y in {frame} [m]",
+                title=f"{kind} points, from above", aspect="equal",
+            )  # fmt: skip
+            axes.legend(loc="center")
+        return figure
 
     def write(self, folder: Folder) -> None:
         """Writes the table of designs, then the numbers."""
@@ -275,17 +358,21 @@ def optimize_design(
             "seed": seed,
         })  # fmt: skip
         candidates = make_candidates(name, settings, source)
+        judging = goal_context(robot if isinstance(robot, Robot) else name, settings)
+        same = replace(settings, generations=1)  # more of them go on
+        arguments = {
+            "cdpr_drake": code_version(), "robot": candidates.text, "settings": plain(same),
+            "grid": plain(judging.grid), "bounds": plain(judging.bounds.as_dict()),
+        }  # fmt: skip
         if folder is None and follow.results is not None:
-            folder = follow.results / _name(loaded.name, candidates.text, settings)
+            subject = json.dumps({"robot": candidates.text, "settings": repr(same)}, sort_keys=True)
+            digest = hashlib.sha256(subject.encode()).hexdigest()[:8]
+            folder = follow.results / f"{loaded.name}-{digest}"
         where = folder or Path(stack.enter_context(TemporaryDirectory()), "design")
-        judging = goal_context(name, settings.poses, settings)
-        arguments = search_arguments(candidates, settings, judging)
         results = stack.enter_context(Folder(Path(where), arguments, overwrite, grows=True))
         try:
-            # A robot that was given as one is searched as such.
-            subject = robot if isinstance(robot, Robot) else name
             solution = search_design(
-                subject, candidates, settings, results, workers=workers, follow=follow
+                candidates, settings, judging, results, workers=workers, follow=follow
             )
         except DesignError as problem:
             if goals or parameters is None:
@@ -294,15 +381,11 @@ def optimize_design(
         design = Design(loaded.name, solution, geometry=loaded.geometry_words(),
                         folder=None if folder is None else results.path)  # fmt: skip
         if solution.complete and solution.best is not None:
-
-            def say(words: str) -> None:
-                follow.progress(Progress(words, 1.0, 1.0))
-
-            file = write_design(solution, loaded.name, results)
+            file = _write_robot(solution, solution.best, loaded.name, results)
             proofs = (
-                confirm(goal, name, str(file), solution.judging, boxes=boxes, say=say,
-                        should_stop=follow.stop) for goal in solution.names
-            )  # fmt: skip
+                confirm(goal, name, str(file), judging, boxes=boxes, follow=follow)
+                for goal in solution.names
+            )
             design = replace(design, confirmed=tuple(filter(None, proofs)))
         if folder is not None and not design.interrupted:
             written(design, results, formats, follow)
@@ -347,22 +430,8 @@ def _settings(
     return settings
 
 
-def _name(robot: str, text: str, settings: DesignSettings) -> str:
-    """Name of a folder that the same robot and settings find again."""
-    arguments = {"robot": text, "settings": repr(replace(settings, generations=1))}
-    digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()
-    return f"{robot}-{digest[:8]}"
-
-
-def write_design(search: DesignSearch, robot: str, folder: Folder) -> Path:
-    """Writes the robot file of the best design, which loads as any other, and returns its path.
-
-    Raises:
-        DesignError: No design could be judged.
-    """
-    best = search.best
-    if best is None:
-        raise DesignError("design: no design could be judged; accepted: smaller reaches")
+def _write_robot(search: DesignSearch, best: int, robot: str, folder: Folder) -> Path:
+    """Writes the robot file of the best design, which loads as any other, and returns its path."""
     title = f"{robot}, design of {len(search.values)} judged for {', '.join(search.names)}"
     text = search.candidates.robot_text(search.sets[best], search.coordinates[best], title)
     folder.write_text(ROBOT_FILE, text)
@@ -373,116 +442,6 @@ def write_design(search: DesignSearch, robot: str, folder: Folder) -> Path:
 def _named(names: Sequence[str], values: Array) -> dict[str, float | None]:
     """Goals by name, as they are: not with the sign changed."""
     return {
-        name: None if not np.isfinite(value) else float(-value if GOALS[name].smaller else value)
-        for name, value in zip(names, values, strict=True)
+        name: float(value) if np.isfinite(value) else None
+        for name, value in zip(names, values * goal_signs(names), strict=True)
     }
-
-
-def _progress(design: Design) -> Figure:
-    from cdpr_drake.analyses.visualization.figure_style import new_figure
-
-    figure, axes = new_figure(1, 1, (7.5, 5.0), f"{design.robot}: search")
-    _draw_progress(axes, design.search)
-    return figure
-
-
-def _pareto(design: Design) -> Figure:
-    from cdpr_drake.analyses.visualization.figure_style import new_figure
-
-    search, names = design.search, design.search.names
-    pairs = list(pairwise(names))
-    size = (6.5 * len(pairs), 5.5)
-    figure, axes = new_figure(1, len(pairs), size, f"{design.robot}: what goals cost each other")
-    for panel, (x, y) in zip(np.atleast_1d(axes), pairs, strict=True):
-        _draw_front(panel, search, names.index(x), names.index(y))
-    return figure
-
-
-def _points(design: Design) -> Figure:
-    from cdpr_drake.analyses.visualization.figure_style import new_figure
-
-    figure, axes = new_figure(1, 2, (12.0, 5.5), f"{design.robot}: points moved")
-    _draw_points(axes, design.search)
-    return figure
-
-
-def _draw_progress(axes: Any, search: DesignSearch) -> None:
-    from cdpr_drake.analyses.visualization.figure_style import line_style
-
-    for number in range(len(search.candidates.cable_sets)):
-        chosen = search.scores[search.sets == number]
-        if not len(chosen):
-            continue
-        look = nth_look(number)
-        words = f"{len(search.candidates.cable_sets[number])} cables"
-        index = np.arange(1, len(chosen) + 1)
-        axes.plot(index, chosen, ".", color=look.color, markersize=3, alpha=0.5)
-        best = np.fmax.accumulate(chosen)
-        axes.step(
-            index, best, where="post", color=look.color, linestyle=look.dash, label=f"best, {words}"
-        )
-    weights = np.array([goal.weight for goal in search.settings.goals])
-    original = np.where(np.isfinite(search.original), np.sign(search.original), 0.0) @ weights
-    axes.axhline(original, **line_style(IDEAL), label="robot as it is")
-    axes.set(xlabel="designs judged", ylabel="score (robot as it is: 1 for each weight)")
-    axes.legend(loc="lower right")
-
-
-def _draw_front(axes: Any, search: DesignSearch, x: int, y: int) -> None:
-    sign = np.array([-1.0 if GOALS[name].smaller else 1.0 for name in search.names])
-    shown = search.values * sign
-    axes.plot(shown[:, x], shown[:, y], ".", color="#a0a0a0", markersize=3, label="designs")
-    front = search.front[np.argsort(shown[search.front, x])]
-    look = nth_look(1)
-    axes.plot(
-        shown[front, x], shown[front, y], linestyle=look.dash, marker=look.marker,
-        color=look.color, markersize=6, label="no other is better in everything",
-    )  # fmt: skip
-    original = search.original * sign
-    axes.plot(
-        original[x], original[y], "*", color="black", markersize=14, label="robot as it is",
-    )  # fmt: skip
-    if search.best is not None:
-        best = shown[search.best]
-        axes.plot(
-            best[x], best[y], "D", markerfacecolor="none", markeredgecolor=PLATFORM.color,
-            markeredgewidth=2, markersize=11, label="best score",
-        )  # fmt: skip
-    for axis, k in ((axes.set_xlabel, x), (axes.set_ylabel, y)):
-        name = search.names[k]
-        unit = "" if GOALS[name].unit == "-" else f" [{GOALS[name].unit}]"
-        axis(f"{name}{unit}" + (", less is better" if GOALS[name].smaller else ""))
-    axes.legend(loc="best")
-
-
-def _draw_points(axes: Any, search: DesignSearch) -> None:
-    from cdpr_drake.analyses.visualization.figure_style import few_ticks
-
-    assert search.best is not None
-    candidates = search.candidates
-    before = parse_robot(candidates.text, Path("robot"))
-    after = candidates.robot(search.sets[search.best], search.coordinates[search.best])
-    cables = list(candidates.cable_sets[search.sets[search.best]])
-    old_set, new_set = before.cable_set(), after.cable_set()
-    for panel, title, frame, old, new in (
-        (axes[0], "exit points, from above", "W", old_set.p_WA, new_set.p_WA),
-        (axes[1], "anchor points, from above", "P", old_set.p_PB, new_set.p_PB),
-    ):
-        panel.plot(
-            old[0], old[1], "o", markerfacecolor="none", color="black", label="robot as it is"
-        )
-        panel.plot(new[0], new[1], "s", color=nth_look(0).color, markersize=5, label="best design")
-        for k, i in enumerate(cables):
-            panel.plot([old[0, i], new[0, k]], [old[1, i], new[1, k]], "-", color="#707070", lw=1)
-        places: dict[tuple[float, ...], list[str]] = {}
-        for i in cables:
-            places.setdefault(tuple(old[:2, i].tolist()), []).append(before.cables[i].name)
-        for place, names in places.items():
-            inward = (-12 if place[0] > 0.0 else 8, -14 if place[1] > 0.0 else 8)
-            panel.annotate(", ".join(names), place, xytext=inward, textcoords="offset points",
-                         ha="right" if place[0] > 0.0 else "left")  # fmt: skip
-        few_ticks(panel.xaxis)
-        panel.set(
-            xlabel=f"x in {frame} [m]", ylabel=f"y in {frame} [m]", title=title, aspect="equal"
-        )  # fmt: skip
-        panel.legend(loc="center")

@@ -7,20 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from fnmatch import fnmatchcase
+from functools import lru_cache
 
 import numpy as np
 from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
-from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
+from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals, goal_signs
 from cdpr_drake.analyses.design.search import (
+    SLOPES,
     DesignSearch,
+    Slopes,
     evaluate_original,
     goal_context,
     scores_of,
     search_design,
 )
-from cdpr_drake.analyses.design.search_methods import SLOPES, Slopes
 from cdpr_drake.analyses.design.settings import DesignSettings
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.workspaces.conditions import KINDS
@@ -29,7 +31,7 @@ from cdpr_drake.errors import DesignError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues
-from cdpr_drake.numerics.program_functions import ProgramCost, ProgramFunction
+from cdpr_drake.numerics.program_functions import ProgramFunction, ValueCost
 from cdpr_drake.schema.yaml_files import load_yaml
 
 STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
@@ -38,16 +40,13 @@ STEPPED = (*KINDS, "csw", "cables", "survives", "breaks-survived")
 STEP = 1e-4
 """Of differences of goals, in boxes of width 1."""
 
-MOST_KEPT = 200
-"""Designs whose goals are kept, since costs and constraints ask for the same ones."""
+MOST_KEPT = 1000
+"""Goals of designs that are kept, since costs and constraints ask for the same ones."""
 
 LOCAL = (
     "a design near the present robot: goals are not convex, and a search by evolution may find a "
     "better one elsewhere"
 )
-
-Told = Callable[[Array], Array]
-"""Numbers of the program's design variables, shape (size,), to shape (r,)."""
 
 
 class DesignProgram(OwnTerms):
@@ -59,7 +58,7 @@ class DesignProgram(OwnTerms):
     motor_torque [N m]. Costs count beside the goals' weighted sum with the sign changed, in which
     every goal is relative to the robot as it is.
 
-    A goal that is the least of smooth functions over the poses, of `search_methods.SLOPES`, enters
+    A goal that is the least of smooth functions over the poses, of `search.SLOPES`, enters
     as such, with exact slopes; others by differences. With nothing added `Solve` is
     `search_design`. With own terms SNOPT seeks from the present robot.
 
@@ -89,8 +88,8 @@ class DesignProgram(OwnTerms):
             CdprError: As `make_candidates` and `evaluate_original`; nothing may move; a goal is a
                 count; there is no such set.
         """
-        name = robot.name if isinstance(robot, Robot) else robot
         self.robot, self.settings, self.number = robot, settings, number
+        name = robot.name if isinstance(robot, Robot) else robot
         self.candidates = make_candidates(name, settings, source)
         if self.candidates.size == 0:
             raise DesignError("design: found nothing that may move; accepted: a reach above 0")
@@ -98,18 +97,21 @@ class DesignProgram(OwnTerms):
             raise DesignError(
                 f"number: found {number}; accepted: 0 to {len(self.candidates.cable_sets) - 1}"
             )
-        self._goals = tuple(goal.name for goal in settings.goals)
+        self._goals = settings.goal_names
         self._refuse_counts(self._goals)
-        self.judging = goal_context(robot, settings.poses, settings)
+        self.judging = goal_context(robot, settings)
         self._original = evaluate_original(self.candidates, self.judging, self._goals)
-        self._goals_at: dict[bytes, dict[str, float]] = {}
+        self._goal_at = lru_cache(MOST_KEPT)(self._goal_of_bytes)
+        self._first = self.candidates.points.size
+        self._lows, self._highs = np.array([*self.candidates.ranges.values()]).reshape(-1, 2).T
         self._values = self._read()
         self._prog = MathematicalProgram()
         self._z = self._prog.NewContinuousVariables(self.candidates.size, "design")
         self._prog.AddBoundingBoxConstraint(0.0, 1.0, self._z)
         self._prog.SetInitialGuess(self._z, self._present())
         self._leasts: list[tuple[object, Slopes]] = []
-        for goal, weight in zip(self._goals, self._weights(), strict=True):
+        weights = scores_of(np.eye(len(self._goals)), self._original, settings)
+        for goal, weight in zip(self._goals, weights, strict=True):
             self._add_goal(goal, weight)
         self._seal()
 
@@ -150,8 +152,8 @@ class DesignProgram(OwnTerms):
         self._refuse_counts([goal])
         low, high = self._bounds(lower, upper, 1)
         size = max(abs(self._goal(goal, self._present())), 1e-9)
-        made = _ByDifferences(lambda z: np.array([self._goal(goal, z) / size]))
-        binding = self._prog.AddConstraint(made, low / size, high / size, vars=self._z)
+        rows = _ByDifferences(lambda z: np.array([self._goal(goal, z) / size]))
+        binding = self._prog.AddConstraint(rows, low / size, high / size, vars=self._z)
         return self._named(binding, "constraint", name or goal)
 
     def AddGoalCost(
@@ -181,16 +183,14 @@ class DesignProgram(OwnTerms):
             CdprError: As `search_design`; no design keeps the own constraints.
         """
         if not self.has_own_terms:
-            return search_design(self.robot, self.candidates, self.settings, follow=follow)
+            return search_design(self.candidates, self.settings, self.judging, follow=follow)
         start = np.zeros(self._prog.num_vars())
         places = self._prog.FindDecisionVariableIndices(self._z)
         start[places] = self._present()
         for least, slopes in self._leasts:
-            margins, _ = slopes(
-                self.candidates, self.number, self._shares(start[places]), self.judging
-            )
+            margins, _ = self._margins(slopes, start[places])
             start[self._prog.FindDecisionVariableIndex(least)] = float(np.min(margins))
-        x, solver, said = self._solve_whole(start, "a design")
+        x, solver, status = self._solve_whole(start, "a design")
         designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
         values = np.array([
             evaluate_goals(self.candidates.robot(self.number, design), self.judging, self._goals)
@@ -200,15 +200,15 @@ class DesignProgram(OwnTerms):
             self.candidates, self.settings, self.judging, self._original,
             np.full(2, self.number), designs, values,
             scores_of(values, self._original, self.settings),
-            program=self._report(x, solver, said, (LOCAL,)),
+            program=self._report(x, solver, status, (LOCAL,)),
         )  # fmt: skip
 
     def _add_goal(self, goal: str, weight: float) -> None:
         slopes = SLOPES.get(goal)
         if slopes is None:
-            sign = -1.0 if GOALS[goal].smaller else 1.0
-            made = _ByDifferences(lambda z: np.array([-weight * sign * self._goal(goal, z)]))
-            self._prog.AddCost(_CostOf(made), vars=self._z)
+            less = -weight * float(goal_signs([goal])[0])
+            cost = _ByDifferences(lambda z: np.array([less * self._goal(goal, z)]))
+            self._prog.AddCost(_CostOf(cost), vars=self._z)
             return
         (least,) = self._prog.NewContinuousVariables(1, f"least {goal}")
         rows = _Margins(lambda z: self._margins(slopes, z))
@@ -220,25 +220,16 @@ class DesignProgram(OwnTerms):
         self._leasts.append((least, slopes))
 
     def _margins(self, slopes: Slopes, z: Array) -> tuple[Array, Array]:
-        values, by = slopes(self.candidates, self.number, self._shares(z), self.judging)
+        values, by = slopes(self.candidates, self.number, self.judging, self._shares(z))
         return values, by * self._share_slopes(z)
 
     def _goal(self, goal: str, z: Array) -> float:
         """The value of a goal, in its unit."""
-        values = self._goals_at.setdefault(z.tobytes(), {})
-        if goal not in values:
-            robot = self.candidates.robot(self.number, self._shares(z))
-            values[goal] = GOALS[goal].value(robot, self.judging)
-        while len(self._goals_at) > MOST_KEPT:
-            del self._goals_at[next(iter(self._goals_at))]
-        return values[goal]
+        return self._goal_at(goal, z.tobytes())
 
-    def _weights(self) -> Array:
-        """Of the goals, each over its size of the robot as it is, as `scores_of`."""
-        size = np.where(
-            np.isfinite(self._original) & (self._original != 0.0), np.abs(self._original), 1.0
-        )
-        return np.array([goal.weight for goal in self.settings.goals]) / size
+    def _goal_of_bytes(self, goal: str, z: bytes) -> float:
+        robot = self.candidates.robot(self.number, self._shares(np.frombuffer(z)))
+        return GOALS[goal].value(robot, self.judging)
 
     def _refuse_counts(self, goals: Sequence[str]) -> None:
         smooth = [name for name in GOALS if name not in STEPPED]
@@ -264,42 +255,40 @@ class DesignProgram(OwnTerms):
             scale.append(high[axis, column] - low[axis, column])
             offset.append(float(cable[key][axis]) + low[axis, column])
             names.append(f"{cable['name']}.{key}.{'xyz'[axis]}")
-        for name, (least, most) in self.candidates.ranges.items():
-            scale.append(most - least)
-            offset.append(least)
-            names.append(name)
-        return np.array(scale), np.array(offset), tuple(names)
+        names += self.candidates.ranges
+        return (
+            np.array([*scale, *(self._highs - self._lows)]), np.array([*offset, *self._lows]),
+            tuple(names),
+        )  # fmt: skip
 
     def _present(self) -> Array:
         """The design variables of the robot as it is, within the ranges."""
         z = np.full(self.candidates.size, 0.5)
         winch = as_robot(self.robot).winch
-        for k, (name, (low, high)) in enumerate(self.candidates.ranges.items()):
-            value = getattr(winch, name)
+        for k, name in enumerate(self.candidates.ranges):
+            value, low, high = getattr(winch, name), self._lows[k], self._highs[k]
             if value is not None:
-                z[self.candidates.points.size + k] = np.clip((value - low) / (high - low), 0, 1)
+                z[self._first + k] = np.clip((value - low) / (high - low), 0, 1)
         return z
 
     def _shares(self, z: Array) -> Array:
         """Coordinates of `Candidates`, whose winches are in ratios."""
-        shares, first = np.array(z, float), self.candidates.points.size
-        for k, (low, high) in enumerate(self.candidates.ranges.values()):
-            shares[first + k] = np.log(1.0 + (high / low - 1.0) * z[first + k]) / np.log(high / low)
+        shares, ratios = np.array(z, float), self._highs / self._lows
+        shares[self._first :] = np.log(1.0 + (ratios - 1.0) * z[self._first :]) / np.log(ratios)
         return shares
 
     def _share_slopes(self, z: Array) -> Array:
         """How these grow with the variables, shape (size,)."""
-        slopes, first = np.ones(len(z)), self.candidates.points.size
-        for k, (low, high) in enumerate(self.candidates.ranges.values()):
-            more = high / low - 1.0
-            slopes[first + k] = more / (1.0 + more * z[first + k]) / np.log(high / low)
+        slopes, ratios = np.ones(len(z)), self._highs / self._lows
+        more = ratios - 1.0
+        slopes[self._first :] = more / (1.0 + more * z[self._first :]) / np.log(ratios)
         return slopes
 
 
 class _ByDifferences(ProgramFunction):
     """Numbers of design variables, with derivatives by differences within their ranges."""
 
-    def __init__(self, function: Told) -> None:
+    def __init__(self, function: Callable[[Array], Array]) -> None:
         self._function = function
 
     def numbers(self, x: Array) -> Array:
@@ -316,22 +305,11 @@ class _ByDifferences(ProgramFunction):
         return self.numbers(x), np.array(slopes).T
 
 
-class _CostOf(ProgramCost):
+class _CostOf(ValueCost):
     """One number as a cost."""
 
     def __init__(self, rows: ProgramFunction) -> None:
         self._rows = rows
-
-    def value(self, x: Array) -> tuple[float, Array]:
-        """Cost and gradient."""
-        values, slopes = self._rows.rows(x)
-        return float(values[0]), slopes[0]
-
-    def __call__(self, x: np.ndarray) -> object:
-        """A number, or one with its gradient."""
-        if x.dtype != object:
-            return float(self._rows.numbers(np.asarray(x, float))[0])
-        return super().__call__(x)
 
 
 class _Margins(ProgramFunction):

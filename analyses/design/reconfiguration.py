@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+import pandas as pd
 from cyclopts import Parameter, Token
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
@@ -25,15 +26,11 @@ from cdpr_drake.analyses.frame.words import (
     OutFolder,
     RobotWord,
     Switch,
-    Word,
     one_of,
-    value_of,
-    with_word,
     words,
 )
-from cdpr_drake.analyses.frame.words import (
-    poses as parse_poses,
-)
+from cdpr_drake.analyses.frame.words import poses as parse_poses
+from cdpr_drake.analyses.kinematics import pose_numbers
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
@@ -59,7 +56,7 @@ from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
 from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.static_feasibility import wrench_matrices
+from cdpr_drake.workspaces.static_feasibility import StaticCase, wrench_matrices
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,23 +81,6 @@ MISSED = 1e-7
 """Margins that are missed by less are kept: tolerance of the program."""
 
 
-@dataclass(frozen=True)
-class PoseProof:
-    """What is proven around a pose.
-
-    Attributes:
-        kind: Kind of `cdpr workspace --certify`.
-        inside: Share of the box that is proven inside.
-        outside: Share that is proven outside.
-        proven: Whether all of it is inside.
-    """
-
-    kind: str
-    inside: float
-    outside: float
-    proven: bool
-
-
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Reconfiguration(Result):
     """A robot whose exit points were moved along rails for a task.
@@ -108,16 +88,15 @@ class Reconfiguration(Result):
     Attributes:
         before: The robot as it was.
         after: As it should be.
-        task: What was asked.
+        task: Poses, wrenches and rails.
         goal: One of `RAIL_GOALS`.
-        names: Cables of each rail.
         solution: What the program found.
-        margins: Of each pose under its worst wrench, as it was and as it is, shape (2, n), straight
-            cables.
-        over_pulleys: Margins of the new robot over its pulleys, shape (n,).
-        tensions: Least largest tension of each pose under its worst wrench now, shape (n,) [N].
-        proofs: What is proven around each pose.
-        around: Half widths of the boxes of poses around each that are proven [m, deg].
+        rails: A row for each rail: names of its cables, coordinates and ends [m].
+        poses: A row for each pose: margins under its worst wrench of straight cables before and
+            now, and over pulleys [-]; least largest tension now [N]; the kind of `cdpr workspace
+            --certify` and which shares of the box around the pose are proven inside and outside.
+        proven: True if the boxes around all poses are proven.
+        around: Half widths of these boxes [m, deg].
         folder: Results folder; None if nothing was kept.
         failed: Of files that could not be written, the name and why.
     """
@@ -126,12 +105,10 @@ class Reconfiguration(Result):
     after: Robot
     task: RailTask
     goal: str
-    names: list[str]
     solution: RailsSolution
-    margins: Array
-    over_pulleys: Array
-    tensions: Array
-    proofs: list[PoseProof]
+    rails: pd.DataFrame
+    poses: pd.DataFrame
+    proven: bool
     around: tuple[float, float]
     folder: Path | None = None
     failed: dict[str, str] = field(default_factory=dict)
@@ -144,74 +121,48 @@ class Reconfiguration(Result):
             return words
         return f"{words} by program and proof; margins also {self.before.geometry_words()}"
 
-    @property
-    def proven(self) -> bool:
-        """True if the boxes around all poses are proven."""
-        return all(proof.proven for proof in self.proofs)
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        rails = self.task.rails
+        poses = self.poses
         result: dict[str, Any] = finite({
             "robot": self.before.name,
             "geometry": self.geometry,
             "goal": self.goal,
-            "rails": [
-                {"cables": name, "from_m": a, "to_m": b, "lower_m": low, "upper_m": high}
-                for name, a, b, low, high in zip(
-                    self.names, rails.at.tolist(), self.solution.coordinates.tolist(),
-                    rails.lower.tolist(), rails.upper.tolist(), strict=True,
-                )
-            ],
-            "least_margin_before": float(np.min(self.margins[0])),
-            "least_margin": float(np.min(self.margins[1])),
-            "least_margin_over_pulleys": float(np.min(self.over_pulleys)),
-            "largest_tension_n": float(np.max(self.tensions)),
+            "rails": self.rails.to_dict("records"),
+            "least_margin_before": float(poses["margin_before"].min()),
+            "least_margin": float(poses["margin"].min()),
+            "least_margin_over_pulleys": float(poses["margin_over_pulleys"].min()),
+            "largest_tension_n": float(poses["largest_tension_n"].max()),
             "wrenches": self.task.loads().shape[1],
             "solver": self.solution.solver,
             "proven": self.proven,
             "proven_around_m_deg": list(self.around),
-            "poses": [
-                {
-                    "position_m": X.translation().tolist(),
-                    "angles_deg": np.degrees(angles_from_rotation(X.rotation())).tolist(),
-                    "margin_before": float(self.margins[0, k]),
-                    "margin": float(self.margins[1, k]),
-                    "margin_over_pulleys": float(self.over_pulleys[k]),
-                    "largest_tension_n": float(self.tensions[k]),
-                    "kind": proof.kind,
-                    "proven_inside": proof.inside,
-                    "proven_outside": proof.outside,
-                }
-                for k, (X, proof) in enumerate(zip(self.task.poses, self.proofs, strict=True))
-            ],
+            "poses": poses.to_dict("records"),
         })  # fmt: skip
         return result
 
     def tables(self) -> list[Table]:
         """Rails."""
-        rails = self.task.rails
-        rows = [
-            (name, f"{a:.4f}", f"{b:.4f}", f"{low:g} to {high:g}")
-            for name, a, b, low, high in zip(
-                self.names, rails.at, self.solution.coordinates, rails.lower, rails.upper,
-                strict=True,
-            )
-        ]  # fmt: skip
         title = f"{self.before.name}: exit points moved along rails"
-        return [Table(title, ("cables", "from [m]", "to [m]", "ends [m]"), rows)]
+        return [Table(title, ("cables", "from [m]", "to [m]", "ends [m]"), [
+            (rail.cables, f"{rail.from_m:.4f}", f"{rail.to_m:.4f}",
+             f"{rail.lower_m:g} to {rail.upper_m:g}")
+            for rail in self.rails.itertuples()
+        ])]  # fmt: skip
 
     def lines(self) -> list[str]:
         """Margins, tensions and proofs."""
-        before, now = np.min(self.margins, axis=1)
-        inside = min(proof.inside for proof in self.proofs)
-        position, turn = self.around
-        verdict = "proven" if self.proven else f"NOT PROVEN, {inside:.1%} at the worst pose"
+        poses, (position, turn) = self.poses, self.around
+        least = poses[["margin_before", "margin", "margin_over_pulleys"]].min()
+        verdict = "proven"
+        if not self.proven:
+            verdict = f"NOT PROVEN, {poses['proven_inside'].min():.1%} at the worst pose"
         return [
             f"cables: {self.geometry}",
-            f"least margin of {len(self.task.poses)} poses under {self.task.loads().shape[1]} "
-            f"wrenches: {before:.4f} before, {now:.4f} now, {np.min(self.over_pulleys):.4f} over "
-            f"pulleys, of half the range of tensions; tensions to {np.max(self.tensions):.4g} N do",
+            f"least margin of {len(poses)} poses under {self.task.loads().shape[1]} wrenches: "
+            f"{least['margin_before']:.4f} before, {least['margin']:.4f} now, "
+            f"{least['margin_over_pulleys']:.4f} over pulleys, of half the range of tensions; "
+            f"tensions to {poses['largest_tension_n'].max():.4g} N do",
             f"all poses within {position:g} m, {turn:g} deg of each: {verdict}",
             *([] if self.folder is None else [f"robot: {self.folder / ROBOT_FILE}"]),
         ]
@@ -260,16 +211,12 @@ class Reconfiguration(Result):
 
     def _draw_margins(self, bars: Any) -> None:
         """Margins of all poses before and after."""
-        number = np.arange(1, len(self.task.poses) + 1)
-        for shift, values, colour, hatch, label in (
-            (-0.2, self.margins[0], "white", "//", "before"),
-            (0.2, self.margins[1], DARK, "", "after"),
-        ):
-            bars.bar(
-                number + shift, values, 0.4, color=colour, edgecolor=DARK, hatch=hatch, label=label
-            )
+        number, poses = np.arange(1, len(self.poses) + 1), self.poses
+        bars.bar(number - 0.2, poses["margin_before"], 0.4, color="white", edgecolor=DARK,
+                 hatch="//", label="before")  # fmt: skip
+        bars.bar(number + 0.2, poses["margin"], 0.4, color=DARK, edgecolor=DARK, label="after")
         bars.plot(
-            number + 0.2, self.over_pulleys, "D", color="white", markeredgecolor=DARK,
+            number + 0.2, poses["margin_over_pulleys"], "D", color="white", markeredgecolor=DARK,
             markersize=5.0, linestyle="none", label="after, over pulleys",
         )  # fmt: skip
         bars.axhline(0.0, color=DARK, linewidth=0.8)
@@ -286,21 +233,20 @@ class Reconfiguration(Result):
         folder.write_json(SUMMARY, self.as_dict())
 
 
-_POSES = words(
-    with_word(parse_poses), "poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them",
-    "POSES",
-)  # fmt: skip
-
-
-def _task(kind: Any, tokens: Sequence[Token]) -> Any:
+def _pose_words(kind: Any, tokens: Sequence[Token]) -> Any:
     """Poses behind --poses, a file behind --path."""
     if tokens[0].keyword == "--path":
         return Path(tokens[0].value)
     return _POSES.converter(kind, tokens)  # type: ignore[misc, operator]
 
 
+_POSES = words(
+    parse_poses, "poses x,y,z or x,y,z,phi,theta,psi [m, deg] with ; between them", "POSES"
+)
+
 PosesWord = Annotated[
-    Any, Parameter(name=("--poses", "--path"), converter=_task, n_tokens=1, metavar="POSES|FILE")
+    Any,
+    Parameter(name=("--poses", "--path"), converter=_pose_words, n_tokens=1, metavar="POSES|FILE"),
 ]
 
 
@@ -342,47 +288,81 @@ def reconfigure(
         CdprError: A file cannot be read, or the robot is not accepted.
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
-    loaded, groups = as_robot(robot, "reconfigure"), list[list[str]]()
+    if starts < 1:
+        raise PlanningError(f"starts: found {starts}; accepted: at least 1")
+    if not (around > 0.0 and turn >= 0.0 and boxes >= 1):
+        raise PlanningError(
+            f"around: found {around:g} m, {turn:g} deg, {boxes} boxes; accepted: above 0, at least "
+            "0, at least 1"
+        )
+    if goal not in RAIL_GOALS:
+        raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
+    before, groups = as_robot(robot, "reconfigure"), list[list[str]]()
     if rails is not None:
         of_file = isinstance(rails, str | Path)
         settings = load_rails(Path(rails)) if of_file else list(rails)
-        loaded = put_rails(loaded, settings, str(rails) if of_file else "rails")
+        before = put_rails(before, settings, str(rails) if of_file else "rails")
         groups = [list(rail.cables) for rail in settings]
         moved = {name for group in groups for name in group}
-        for cable in loaded.cables:  # rails that are given take the place of all of the robot's
+        for cable in before.cables:  # rails that are given take the place of all of the robot's
             if cable.rail is not None and cable.name not in moved:
                 cable.exit_point, cable.rail = cable.exit_point + cable.rail.shift(), None
-    X_WP = _task_poses(loaded, poses, samples)
-    wrenches = load_wrench_set(Path(resist)) if isinstance(resist, str | Path) else resist
+    X_WP = _task_poses(before, poses, samples)
+    required = load_wrench_set(Path(resist)) if isinstance(resist, str | Path) else resist
     arguments = {
-        "robot": loaded.name, "rails": str(rails), "poses": [pose_in_degrees(X) for X in X_WP],
+        "robot": before.name, "rails": str(rails), "poses": [pose_in_degrees(X) for X in X_WP],
         "resist": str(resist), "goal": goal, "limits": limits, "starts": starts,
         "around": [around, turn, boxes],
     }  # fmt: skip
-    name = f"rails/{loaded.name}"
+    name = f"rails/{before.name}"
     with results_folder(name, arguments, folder, overwrite, follow.results) as results:
+        track, names = rails_of(before, groups)
+        task = RailTask(static_case(before, limits, pulleys=False), track, X_WP, required)
         try:
-            solution = reconfigured(
-                loaded, X_WP, wrenches, groups, goal=goal, limits=limits, starts=starts,
-                around=(around, turn), boxes=boxes, say=follow.doing,
-            )  # fmt: skip
+            task.loads()
         except WrenchSetError as problem:
-            if wrenches is resist:
+            if required is resist:
                 raise
             raise WrenchSetError(f"{resist}: {problem}") from problem
+        follow.doing(f"Moving exit points of {before.name}")
+        solution = _best_coordinates(task, goal, starts)
+        after = _moved(before, names, solution.coordinates)
+        follow.doing("Proving what is around the poses")
+        case = static_case(after, limits, pulleys=False)
+        kind = CertifiedKind.STATIC if required is None else CertifiedKind.WRENCH_FEASIBLE
+        claim = CertifyTask(kind, case, required or SpatialSet())
+        proofs = [certify(claim, _box_around(case, X, around, turn), boxes) for X in X_WP]
+        before_margins, margins = (
+            np.min(task.margins(at), axis=1) for at in (track.at, solution.coordinates)
+        )
+        result = Reconfiguration(
+            before=before, after=after, task=task, goal=goal, solution=solution,
+            rails=pd.DataFrame({
+                "cables": names, "from_m": track.at, "to_m": solution.coordinates,
+                "lower_m": track.lower, "upper_m": track.upper,
+            }),
+            poses=pd.DataFrame({
+                **pd.DataFrame([pose_numbers(X) for X in X_WP]), "margin_before": before_margins,
+                "margin": margins, "margin_over_pulleys": _over_pulleys(task, after, limits),
+                "largest_tension_n": np.max(task.largest_tensions(solution.coordinates), axis=1),
+                "kind": kind.value,
+                "proven_inside": [proof.inside for proof in proofs],
+                "proven_outside": [proof.outside for proof in proofs],
+            }),
+            proven=all(bool(np.all(proof.verdicts == INSIDE)) for proof in proofs),
+            around=(around, turn), folder=None if results is None else results.path,
+        )  # fmt: skip
         if results is not None:
-            solution = replace(solution, folder=results.path)
-            written(solution, results, formats, follow)
-        return solution
+            written(result, results, formats, follow)
+        return result
 
 
 def _task_poses(robot: Robot, poses: Any, samples: int) -> list[RigidTransform]:
     """Poses themselves, or `samples` of a path from a file."""
-    if isinstance(poses, Word) or not isinstance(poses, Path | str):
-        result = [as_pose(robot, pose) for pose in value_of(poses)]
-        if not result:
+    if not isinstance(poses, Path | str):
+        if not len(poses):
             raise PlanningError("poses: found none; accepted: at least 1")
-        return result
+        return [as_pose(robot, pose) for pose in poses]
     if samples < 2:
         raise PlanningError(f"samples: found {samples}; accepted: at least 2")
     read = path_poses(robot, poses)
@@ -390,50 +370,8 @@ def _task_poses(robot: Robot, poses: Any, samples: int) -> list[RigidTransform]:
     return [path.pose(float(s)) for s in np.linspace(0.0, path.length, samples)]
 
 
-def reconfigured(
-    robot: Robot,
-    poses: Sequence[RigidTransform],
-    required: SpatialSet | None = None,
-    groups: Sequence[Sequence[str]] = (),
-    *,
-    goal: str = MARGIN,
-    limits: tuple[float, float] | None = None,
-    starts: int = STARTS,
-    around: tuple[float, float] = (AROUND, TURN),
-    boxes: int = BOXES,
-    say: Callable[[str], None] = lambda words: None,
-) -> Reconfiguration:
-    """Puts exit points of a robot along its rails for poses, and proves what is round these.
-
-    Args:
-        robot: The robot, with rails.
-        poses: X_WP, at least one [m].
-        required: Wrenches to resist at each; None: none beside the weight.
-        groups: Cables that move together.
-        goal: One of `RAIL_GOALS`.
-        limits: Smallest and largest tension [N]; None: the robot's.
-        starts: Of the program.
-        around: Half widths of the box of poses that is proven around each [m, deg].
-        boxes: Boxes that are judged, at most, for each pose.
-        say: Called with words for what is done now.
-
-    Raises:
-        PlanningError: No position of the rails does it; names pose and wrench. Or something is not
-            accepted.
-        CdprError: The robot cannot be asked.
-    """
-    if goal not in RAIL_GOALS:
-        raise PlanningError(f"goal: found {goal!r}; {accepted_names(goal, RAIL_GOALS)}")
-    if starts < 1:
-        raise PlanningError(f"starts: found {starts}; accepted: at least 1")
-    if not (around[0] > 0.0 and around[1] >= 0.0 and boxes >= 1):
-        raise PlanningError(
-            f"around: found {around[0]:g} m, {around[1]:g} deg, {boxes} boxes; accepted: above 0, "
-            "at least 0, at least 1"
-        )
-    rails, names = rails_of(robot, groups)
-    task = RailTask(static_case(robot, limits, pulleys=False), rails, list(poses), required)
-    say(f"Moving exit points of {robot.name}")
+def _best_coordinates(task: RailTask, goal: str, starts: int) -> RailsSolution:
+    """Coordinates of the rails; refuses if no position of theirs does it."""
     program = ReconfigurationProgram(task)
     program.AddLargestMargin()
     solution = program.Solve(starts)
@@ -444,21 +382,11 @@ def reconfigured(
         program = ReconfigurationProgram(task)
         program.AddLeastLargestTension()
         solution = program.Solve(starts)
-        margins = task.margins(solution.coordinates)
     if not solution.success:
         raise PlanningError(
             f"rails: {solution.solver}: {solution.status}; accepted: other rails or poses"
         )
-    after = _moved(robot, names, solution.coordinates)
-    case = static_case(after, limits, pulleys=False)
-    say("Proving what is around the poses")
-    return Reconfiguration(
-        before=robot, after=after, task=task, goal=goal, names=names, solution=solution,
-        margins=np.array([np.min(task.margins(rails.at), axis=1), np.min(margins, axis=1)]),
-        over_pulleys=_over_pulleys(task, after, limits),
-        tensions=np.max(task.largest_tensions(solution.coordinates), axis=1),
-        proofs=[_proof(case, X, required, around, boxes) for X in task.poses], around=around,
-    )  # fmt: skip
+    return solution
 
 
 def _impossible(task: RailTask, margins: Array) -> str:
@@ -496,17 +424,10 @@ def _over_pulleys(task: RailTask, robot: Robot, limits: tuple[float, float] | No
     return np.asarray(np.min(tension_margins(case, W, task.loads()), axis=1))
 
 
-def _proof(
-    case: Any, X_WP: RigidTransform, required: SpatialSet | None, around: tuple[float, float],
-    boxes: int,
-) -> PoseProof:  # fmt: skip
-    """Boxes around a pose, of straight cables from the exit points."""
-    kind = CertifiedKind.STATIC if required is None else CertifiedKind.WRENCH_FEASIBLE
+def _box_around(case: StaticCase, X_WP: RigidTransform, distance: float, turn: float) -> PoseBox:
+    """Poses within a distance [m] and angles [deg] of a pose."""
     middle = np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
     half = np.zeros(6)
     for row in case.rows:
-        half[row + 3 if row < 3 else row - 3] = np.radians(around[1]) if row < 3 else around[0]
-    task = CertifyTask(kind, case, required or SpatialSet())
-    result = certify(task, PoseBox(middle - half, middle + half), boxes)
-    proven = bool(np.all(result.verdicts == INSIDE))
-    return PoseProof(kind.value, result.inside, result.outside, proven)
+        half[row + 3 if row < 3 else row - 3] = np.radians(turn) if row < 3 else distance
+    return PoseBox(middle - half, middle + half)

@@ -1,33 +1,35 @@
-"""The search for a design: generations of candidates, each of which is kept as it is judged."""
+"""The search for a design: by evolution, or by slopes; each design is kept as it is judged.
+
+* `evolve` is CMA-ES by the package cmaes, a generation at a time; it needs no gradients.
+* `climb` seeks the largest least value of many smooth functions by their slopes; `SLOPES` has
+  those of goals by the coordinates of a design.
+* `pareto_front` finds designs of several values that no other one dominates.
+
+Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
+2001; Deb, Multi-objective optimization using evolutionary algorithms, 2001; see `climb`.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from scipy.optimize import linprog
 
 from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
-from cdpr_drake.analyses.design.search_methods import (
-    SLOPES,
-    EvolutionSearch,
-    Slopes,
-    SlopeSearch,
-    default_population,
-    pareto_front,
-)
-from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings, PosesSettings
+from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import Processes, finished_jobs
-from cdpr_drake.analyses.reporting.provenance import code_version
-from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DesignError
@@ -35,30 +37,44 @@ from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
 from cdpr_drake.workspaces.pose_grid import grid_by_count
+from cdpr_drake.workspaces.wrench_capacity import margin_slopes
 
 JUDGED = "judged.jsonl"
 """Goals of each design, a line each, as it is judged."""
 
+STEP = 0.2
+"""Standard deviation of the first generation, of boxes of width 1."""
+
+REFUSED = 1e9
+"""Score, with the sign changed, of designs that cannot be judged."""
+
+FIRST_STEP, LARGEST_STEP, SMALLEST_STEP = 0.1, 0.5, 1e-4
+"""Half widths of the box around the best design in which slopes are believed, of boxes of width 1:
+at first, at most, and where the search ends."""
+
+GOOD = 0.1
+"""Share of the promised gain from which on a step is accepted; from half on the box grows."""
+
 
 @dataclass(frozen=True, eq=False)
 class DesignSearch:
-    """What a search found.
+    """Result of a search.
 
     Attributes:
         candidates: The designs that there may be.
-        settings: What was wanted.
+        settings: Goals, poses and length of the search.
         judging: What designs were judged by.
         original: Goals of the robot as it is, larger is better, shape (goals,).
-        sets: Number of the set of cables of each design judged, shape (n,).
+        sets: Number of the set of cables of each design, shape (n,).
         coordinates: The designs, in the order of the search, shape (n, size).
         values: Their goals, larger is better, shape (n, goals).
         scores: Weighted sums, as `scores_of`, shape (n,).
         complete: True if it was not stopped.
         earlier: How many of the designs an earlier command had judged.
         wall_time: Time that the search took [s].
-        program: Of a `DesignProgram` with own terms, how it was solved; None: by a search.
+        program: How a `DesignProgram` with own terms was solved; None: by a search.
     """
 
     candidates: Candidates
@@ -77,11 +93,11 @@ class DesignSearch:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the goals."""
-        return tuple(goal.name for goal in self.settings.goals)
+        return self.settings.goal_names
 
     @property
     def best(self) -> int | None:
-        """Number of the design of the largest score; None where none could be judged."""
+        """Number of the design with the largest score; None if none could be judged."""
         return int(np.nanargmax(self.scores)) if np.any(np.isfinite(self.scores)) else None
 
     @property
@@ -90,14 +106,14 @@ class DesignSearch:
         return np.flatnonzero(pareto_front(self.values))
 
 
-def goal_context(robot: Robot | str, poses: PosesSettings, settings: DesignSettings) -> GoalContext:
-    """What designs of a robot are judged by.
+def goal_context(robot: Robot | str, settings: DesignSettings) -> GoalContext:
+    """Poses, wrenches and bounds by which designs of a robot are judged.
 
     Raises:
-        CdprError: The box is empty or outside the robot's frame.
+        CdprError: The box of poses is empty or outside the robot's frame.
     """
     name = robot.name if isinstance(robot, Robot) else robot
-    robot = as_robot(robot)
+    robot, poses = as_robot(robot), settings.poses
     defaults = workspace_defaults(robot, name)
     lower = defaults.lower if poses.lower is None else poses.lower
     upper = defaults.upper if poses.upper is None else poses.upper
@@ -108,10 +124,7 @@ def goal_context(robot: Robot | str, poses: PosesSettings, settings: DesignSetti
         raise DesignError(
             f"poses: found a box that leaves the frame of {robot.name}; accepted: one in it"
         )
-    counts = [
-        1 if low == high else int(n)
-        for low, high, n in zip(lower, upper, poses.counts, strict=True)
-    ]
+    counts = np.where(lower == upper, 1, poses.counts).astype(int).tolist()
     turn = np.radians(poses.turn_deg)
     axes = [row for row in robot.motion_type().rows or () if row < 3]
     angles = [np.zeros(3)]
@@ -141,78 +154,206 @@ def evaluate_original(candidates: Candidates, judging: GoalContext, names: Seque
     """
     robot = parse_robot(candidates.text, Path("robot"))
     check_goals(robot, judging, names)
-    return evaluate_goals(robot, judging, tuple(names))
+    return evaluate_goals(robot, judging, names)
 
 
 def search_design(
-    robot: Robot | str,
-    candidates: Candidates,
-    settings: DesignSettings,
-    folder: Folder | None = None,
-    *,
-    workers: int | str | None = 1,
-    follow: Follow = NOBODY,
-) -> DesignSearch:
+    candidates: Candidates, settings: DesignSettings, judging: GoalContext,
+    folder: Folder | None = None, *, workers: int | str | None = 1, follow: Follow = NOBODY,
+) -> DesignSearch:  # fmt: skip
     """Searches the best design of each set of cables by evolution, or by slopes.
 
     With a folder that an earlier search of the same arguments has left the search goes on: designs
     are kept one by one, and the search, which follows from their goals, is replayed.
 
     Args:
-        robot: The robot, or its name or path.
-        candidates: What it may become.
-        settings: What is wanted.
-        folder: Open folder of `search_arguments`; None: nothing is kept.
+        candidates: The designs that there may be.
+        settings: Goals, and how long to search.
+        judging: As `goal_context`.
+        folder: Open folder; None: nothing is kept.
         workers: As of `finished_jobs`; the kernels of one process use all processors.
         follow: Who follows.
 
     Raises:
         OutputFolderError: The folder cannot be written.
-        CdprError: The robot cannot be asked for a goal.
+        CdprError: The robot cannot be asked for a goal, or there are no slopes of them.
     """
-    slopes = _slopes_of(settings)
-    judging = goal_context(robot, settings.poses, settings)
-    names = tuple(goal.name for goal in settings.goals)
-    original = evaluate_original(candidates, judging, names)
-    search = _Search(candidates, settings, judging, names, original, folder, workers, follow)
-    with search.standing:
-        for number in range(len(candidates.cable_sets)):
-            if candidates.size and slopes is not None:
-                complete = search.by_slopes(number, slopes)
-            else:
-                complete = search.by_evolution(number)
-            if not complete:
-                break
-    values = np.array(search.values).reshape(-1, len(names))
-    return DesignSearch(
-        candidates, settings, judging, original, np.array(search.sets, int),
-        np.array(search.designs).reshape(-1, candidates.size), values,
-        scores_of(values, original, settings), complete, search.earlier,
-        time.perf_counter() - search.count.began,
-    )  # fmt: skip
-
-
-def _slopes_of(settings: DesignSettings) -> Slopes | None:
-    """Slopes of the only goal, if they are asked for; None by evolution.
-
-    Raises:
-        DesignError: There are none of what is wanted.
-    """
-    if settings.search != BY_SLOPES:
-        return None
-    names = [goal.name for goal in settings.goals]
-    if len(names) != 1 or names[0] not in SLOPES:
+    names = settings.goal_names
+    by_slopes = settings.search == BY_SLOPES
+    if by_slopes and not (len(names) == 1 and names[0] in SLOPES):
         raise DesignError(
             f"search: found slopes for {', '.join(names)}; accepted with slopes: one goal of "
             f"{', '.join(SLOPES)}"
         )
-    return SLOPES[names[0]]
+    judge = _Judge(candidates, settings, judging, folder, workers, follow)
+    began = time.perf_counter()
+    size, most = candidates.size, settings.generations if candidates.size else 1
+    population = settings.population or 4 + math.floor(3 * math.log(max(size, 1)))  # as Hansen
+    judge.expect(len(candidates.cable_sets) * most * (population if size and not by_slopes else 1))
+    complete = True
+    with judge.processes:
+        for number in range(len(candidates.cable_sets)):
+            if by_slopes and size:
+                slopes_at = partial(SLOPES[names[0]], candidates, number, judging)
+                search, word = climb(size, most, slopes_at), "step"
+            else:
+                search = evolve(size, population, most, settings.seed, judge.scores)
+                word = "generation"
+            complete = judge.follow_search(search, f"set{number}-{word}", number, most)
+            if not complete:
+                break
+    values = np.array(judge.values).reshape(-1, len(names))
+    return DesignSearch(
+        candidates, settings, judging, judge.original, np.array(judge.sets, int),
+        np.array(judge.designs).reshape(-1, size), values, judge.scores(values), complete,
+        judge.earlier, time.perf_counter() - began,
+    )  # fmt: skip
+
+
+Search = Generator[Array, Array, None]
+"""Yields designs, shape (n, size), and is sent their goals, larger is better, shape (n, goals); NaN
+where a design cannot be judged."""
+
+
+def evolve(
+    size: int, population: int, generations: int, seed: int, score: Callable[[Array], Array]
+) -> Search:
+    """Seeks the largest score by evolution, from the middle of the box [0, 1]^size.
+
+    Args:
+        size: Number of coordinates; of 0 the only design is asked for once.
+        population: Designs of a generation.
+        generations: Number of generations.
+        seed: Of the random numbers.
+        score: Scores of goals, shape (n,).
+
+    Raises:
+        DesignError: The package cmaes is not installed.
+    """
+    if size == 0:
+        yield np.zeros((1, 0))
+        return
+    try:
+        from cmaes import CMA
+    except ImportError as problem:
+        raise DesignError(
+            "design: the package cmaes is not installed; pip install 'cdpr_drake[design]'"
+        ) from problem
+    padded = max(size, 2)  # CMA wants several coordinates: the second of one does nothing
+    search = CMA(
+        mean=np.full(padded, 0.5), sigma=STEP, bounds=np.tile([0.0, 1.0], (padded, 1)), seed=seed,
+        population_size=population,
+    )  # fmt: skip
+    for _ in range(generations):
+        designs = [search.ask() for _ in range(population)]
+        scores = score((yield np.array(designs)[:, :size]))
+        losses = np.where(np.isfinite(scores), -scores, REFUSED)
+        search.tell(list(zip(designs, losses.tolist(), strict=True)))
+
+
+def climb(size: int, most: int, slopes_at: Callable[[Array], tuple[Array, Array]]) -> Search:
+    """Seeks the largest least value of many smooth functions by their slopes.
+
+    It asks for one design after the other, from the middle of the box [0, 1]^size, whose only goal
+    is the least value. Each step is a linear program: the largest least value of the linearised
+    functions within a box around the best design, whose size follows how well the last promise was
+    kept. Where one function is the least alone that is an ascent along its slope; where several
+    are, it goes between them, which an ascent could not.
+
+    Args:
+        size: Number of coordinates.
+        most: Largest number of designs.
+        slopes_at: All values at a design, shape (n,), and their slopes, shape (n, size).
+
+    Source: Madsen, An algorithm for minimax solution of overdetermined systems of non-linear
+    equations, 1975; Nocedal and Wright, Numerical Optimization, 4.
+    """
+    design, step, promised = np.full(size, 0.5), FIRST_STEP, np.inf
+    best, value = design, -np.inf
+    values, slopes = np.empty(0), np.empty((0, size))
+    for _ in range(most):
+        least = float((yield design[np.newaxis])[0, 0])
+        gain = least - value
+        if np.isfinite(value):
+            share = gain / promised if np.isfinite(gain) else -np.inf
+            if share < GOOD:
+                step *= 0.4
+            elif share > 0.5:
+                step = min(1.5 * step, LARGEST_STEP)
+        elif not np.isfinite(least):
+            return  # the first design is refused, and there are no slopes
+        if gain > 0.0:
+            best, value = design, least
+            values, slopes = slopes_at(best)
+        if step < SMALLEST_STEP:
+            return
+        low, high = np.maximum(-step, -best), np.minimum(step, 1.0 - best)
+        program = linprog(  # the largest t with values + slopes s >= t
+            np.append(np.zeros(size), -1.0),
+            A_ub=np.hstack([-slopes, np.ones((len(values), 1))]), b_ub=values,
+            bounds=[*zip(low, high, strict=True), (None, None)], method="highs",
+        )  # fmt: skip
+        promised = -np.inf if program.x is None else float(program.x[-1] - value)
+        if promised <= 1e-9 * max(abs(value), 1e-9):
+            return
+        design = np.clip(best + program.x[:-1], 0.0, 1.0)
+
+
+def pareto_front(values: Array) -> np.ndarray:
+    """Which rows no other row equals or exceeds in everything and exceeds in something.
+
+    Args:
+        values: One design a row, larger is better, shape (n, k); rows with NaN never count.
+
+    Returns:
+        Shape (n,), bool. Of equal rows the first counts.
+    """
+    values = np.asarray(values, float)
+    good = np.all(np.isfinite(values), axis=1)
+    front = good.copy()
+    for i in np.flatnonzero(good):
+        better = np.all(values[good] >= values[i], axis=1) & np.any(
+            values[good] > values[i], axis=1
+        )
+        equal = np.all(values[:i] == values[i], axis=1) & good[:i]
+        front[i] = not np.any(better) and not np.any(equal)
+    return front
+
+
+Slopes = Callable[[Candidates, int, GoalContext, Array], tuple[Array, Array]]
+"""Values at all poses of the grid, shape (n,), and their slopes by the coordinates, (n, size)."""
+
+
+def _capacity_margin(
+    candidates: Candidates, number: int, judging: GoalContext, coordinates: Array
+) -> tuple[Array, Array]:
+    robot, grid = candidates.robot(number, coordinates), judging.grid
+    about = pose_conditions(robot, required=judging.required)
+    positions, rotations = grid.positions(0, grid.size), grid.rotations(0, grid.size)
+    demand = resisting(about.case, about.required or SpatialSet(), rotations)
+    slopes = margin_slopes(about.case, positions, rotations, demand)
+    cables = list(candidates.cable_sets[number])
+    m = candidates.points.reach.shape[1] // 2
+    by_points = np.zeros((grid.size, 3, 2 * m))
+    by_points[:, :, cables] = slopes.exits
+    by_points[:, :, [m + k for k in cables]] = slopes.anchors
+    by_coordinates = candidates.points.slopes(by_points)
+    # Of the winch, each on a scale of its own logarithm: the largest tension is what it pulls.
+    pull, signs = robot.tension_limits(None)[1], {"drum_radius": -1.0}
+    winch = [
+        slopes.upper * pull * signs.get(name, 1.0) * np.log(high / low)
+        for name, (low, high) in candidates.ranges.items()
+    ]
+    return slopes.found.margins, np.column_stack([by_coordinates, *winch])
+
+
+SLOPES: dict[str, Slopes] = {"capacity-margin": _capacity_margin}
+"""By names of goals."""
 
 
 def judged(
-    candidates: Candidates, names: tuple[str, ...], judging: GoalContext,
-    design: tuple[int, Array],
-) -> list[float]:  # fmt: skip
+    candidates: Candidates, names: Sequence[str], judging: GoalContext, design: tuple[int, Array]
+) -> list[float]:
     """Goals of a design, a set of cables and coordinates, larger is better; NaN if it cannot be."""
     try:
         return evaluate_goals(candidates.robot(*design), judging, names).tolist()
@@ -220,140 +361,84 @@ def judged(
         return [np.nan] * len(names)
 
 
-class _Search:
-    """What was judged so far, and where the search stands."""
+class _Judge:
+    """Judges designs, each of them once, and keeps the goals of all in the folder."""
 
     def __init__(
         self, candidates: Candidates, settings: DesignSettings, judging: GoalContext,
-        names: tuple[str, ...], original: Array, folder: Folder | None, workers: int | str | None,
-        follow: Follow,
+        folder: Folder | None, workers: int | str | None, follow: Follow,
     ) -> None:  # fmt: skip
+        names = settings.goal_names
+        self.original = evaluate_original(candidates, judging, names)
         self.sets: list[int] = []
         self.designs: list[Array] = []
         self.values: list[Array] = []
-        self.standing = Processes()
         self.earlier = 0
-        self._candidates, self._settings, self._judging = candidates, settings, judging
-        self._original, self._folder, self._workers = original, folder, workers
+        self.processes = Processes()
+        self.scores = partial(scores_of, original=self.original, settings=settings)
         self._work = partial(judged, candidates, names, judging)
-        self._follow, self._best, self._said = follow, -np.inf, set[str]()
-        self._known = {} if folder is None or not folder.resumed else _read(folder.path / JUDGED)
-        if folder is not None and self._known:  # without a line that a kill has cut
-            lines = (json.dumps(item) + "\n" for item in self._known.items())
+        self._folder, self._workers, self._follow, self._best = folder, workers, follow, -np.inf
+        self._say = cache(follow.say)  # words of a cluster once, not in each generation
+        self._goals: dict[str, list[float]] = {}
+        if folder is not None and folder.resumed:
+            self._goals = _read(folder.path / JUDGED)
+        if folder is not None and self._goals:  # without a line that a kill has cut
+            lines = (json.dumps(item) + "\n" for item in self._goals.items())
             folder.write_text(JUDGED, "".join(lines))
-        slopes = settings.search == BY_SLOPES
-        self._population = settings.population or default_population(candidates.size)
-        each = self._population if candidates.size and not slopes else 1
-        rounds = settings.generations if candidates.size else 1
-        total = len(candidates.cable_sets) * rounds * each
-        self.count = Count(follow, total, min(len(self._known), total), unit="designs")
 
-    def by_evolution(self, number: int) -> bool:
-        """Seeks the best design of a set of cables; a set that cannot change is judged once.
+    def expect(self, total: int) -> None:
+        """Begins to count that many designs."""
+        self._count = Count(self._follow, total, min(len(self._goals), total), unit="designs")
 
-        Returns:
-            False if it was stopped.
-        """
-        size, settings = self._candidates.size, self._settings
-        search = EvolutionSearch(size, self._population, settings.seed) if size else None
-        for generation in range(settings.generations if size else 1):
-            X = np.zeros((1, 0)) if search is None else search.ask()
-            values = self._judge(f"set{number}-generation{generation:04d}", number, X)
+    def follow_search(self, search: Search, name: str, number: int, most: int) -> bool:
+        """Judges all that a search of a set of cables asks for; False if it was stopped."""
+        X = next(search)
+        for k in count():
+            values = self._judge(f"{name}{k:04d}", number, X)
             if values is None:
                 return False
-            if search is not None:
-                search.tell(self._scores(values))
-        return True
-
-    def by_slopes(self, number: int, slopes: Slopes) -> bool:
-        """Seeks the best design of a set of cables, one design after the other.
-
-        Slopes are computed again when a search goes on: they follow from the design.
-
-        Returns:
-            False if it was stopped.
-        """
-        search, most = SlopeSearch(self._candidates.size), self._settings.generations
-        for step in range(most):
-            design = search.ask()
-            values = self._judge(f"set{number}-step{step:04d}", number, design[np.newaxis])
-            if values is None:
-                return False
-            value = float(values[0, 0])
-            every, by = np.empty(0), np.empty((0, len(design)))
-            if search.wants_slopes(value):
-                every, by = slopes(self._candidates, number, design, self._judging)
-            search.tell(value, every, by)
-            if search.ended:
-                self.count.total -= most - step - 1
+            try:
+                X = search.send(values)
+            except StopIteration:
+                self._count.total -= most - k - 1
                 break
         return True
 
     def _judge(self, name: str, number: int, X: Array) -> Array | None:
         """Goals of designs, shape (n, goals); None if it was stopped before all were judged."""
         keys = [f"{name}-{k}" for k in range(len(X))]
-        lacking = [k for k, key in enumerate(keys) if key not in self._known]
+        lacking = [k for k, key in enumerate(keys) if key not in self._goals]
         self.earlier += len(X) - len(lacking)
         for finished in finished_jobs(
             self._work, [(number, X[k]) for k in lacking], self._workers, stop=self._follow.stop,
-            say=self._say, name="design", standing=self.standing,
+            say=self._say, name="design", standing=self.processes,
         ):  # fmt: skip
             if finished.problem is not None:
                 raise finished.problem
             self._keep(keys[lacking[finished.number]], finished.result or [])
             best = f"best {self._best:.4g}" if np.isfinite(self._best) else name
-            self.count.add(1, best)
-        values = [self._known[key] for key in keys if key in self._known]
-        if len(values) < len(X):
+            self._count.add(1, best)
+        if not all(key in self._goals for key in keys):
             return None
-        goals = np.array(values, float).reshape(len(X), -1)
+        values = np.array([self._goals[key] for key in keys], float).reshape(len(X), -1)
         self.sets += [number] * len(X)
         self.designs += list(X)
-        self.values += list(goals)
-        finite = np.all(np.isfinite(goals), axis=1)
-        self._best = max([self._best, *self._scores(goals)[finite]])
-        return goals
+        self.values += list(values)
+        finite = np.all(np.isfinite(values), axis=1)
+        self._best = max([self._best, *self.scores(values)[finite]])
+        return values
 
-    def _say(self, words: str) -> None:
-        """Says words of a cluster once, not in each generation."""
-        if words not in self._said:
-            self._said.add(words)
-            self._follow.say(words)
-
-    def _keep(self, key: str, values: list[float]) -> None:
-        self._known[key] = values
+    def _keep(self, key: str, goals: list[float]) -> None:
+        self._goals[key] = goals
         if self._folder is not None:
             with self._folder.writing(), self._folder.claim(JUDGED).open("a") as file:
-                file.write(json.dumps([key, values]) + "\n")
-
-    def _scores(self, values: Array) -> Array:
-        return scores_of(values, self._original, self._settings)
+                file.write(json.dumps([key, goals]) + "\n")
 
 
 def _read(path: Path) -> dict[str, list[float]]:
-    """Goals of judged designs by their keys; a line that a kill has cut does not count.
-
-    Raises:
-        DesignError: A line is none that this program wrote.
-    """
+    """Goals of judged designs by their keys; a line that a kill has cut does not count."""
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
     try:
         return dict(load_json(line) for line in lines if line.endswith("\n"))
     except (ValueError, TypeError) as problem:
         raise DesignError(f"{path}: found no lines of a search: {problem}") from problem
-
-
-def search_arguments(
-    candidates: Candidates, settings: DesignSettings, judging: GoalContext
-) -> dict[str, Any]:
-    """All that the numbers depend on, for JSON."""
-    arguments: dict[str, Any] = plain(
-        {
-            "cdpr_drake": code_version(),
-            "robot": candidates.text,
-            "settings": replace(settings, generations=1),  # more of them go on
-            "grid": judging.grid,
-            "bounds": judging.bounds.as_dict(),
-        }
-    )
-    return arguments

@@ -106,6 +106,11 @@ class DesignSettings:
     population: int | None = whole("Designs of a generation; null: as CMA-ES has it.", None)
     seed: int = whole("Of the search.", 0, at_least=0)
 
+    @property
+    def goal_names(self) -> tuple[str, ...]:
+        """Names of the goals."""
+        return tuple(goal.name for goal in self.goals)
+
 
 def load_design_settings(path: Path) -> DesignSettings:
     """Reads a file of design parameters.

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Any
 
-from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.errors import OutputFolderError, why_not_read
 
 
@@ -32,10 +32,6 @@ class WrittenFiles(Result):
     def as_dict(self) -> dict[str, Any]:
         """What they are, and their paths."""
         return {**self.about, "files": [str(path) for path in self.paths], **(self.more or {})}
-
-    def tables(self) -> list[Table]:
-        """None."""
-        return []
 
     def lines(self) -> list[str]:
         """Their paths."""

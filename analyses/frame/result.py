@@ -43,9 +43,9 @@ class Result(ABC):
     def as_dict(self) -> Any:
         """All numbers, for JSON; keys end in units. Of a list of things a list."""
 
-    @abstractmethod
     def tables(self) -> Sequence[Table]:
         """What it shows of itself."""
+        return ()
 
     def lines(self) -> Sequence[str]:
         """Sentences below the tables."""
@@ -116,6 +116,40 @@ class Result(ABC):
             caption = f"<caption>{escape(table.title)}</caption>"
             parts.append(f"<table>{caption}<tr>{head}</tr>{rows}</table>")
         return "".join([*parts, *(f"<p>{escape(line)}</p>" for line in self.lines())])
+
+
+@dataclass(frozen=True, repr=False)
+class Listing(Result):
+    """A list of things.
+
+    Attributes:
+        entries: Each thing, for JSON; keys end in units.
+        table: The list; None: it is not shown.
+        words: Sentences below it.
+        code: Exit code of a command.
+    """
+
+    entries: Sequence[dict[str, Any]]
+    table: Table | None = None
+    words: Sequence[str] = ()
+    code: int = 0
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """A list, an entry each."""
+        return list(self.entries)
+
+    def tables(self) -> list[Table]:
+        """The list."""
+        return [] if self.table is None else [self.table]
+
+    def lines(self) -> Sequence[str]:
+        """The sentences."""
+        return self.words
+
+    @property
+    def exit_code(self) -> int:
+        """Of a command."""
+        return self.code
 
 
 def _is_number(word: str) -> bool:

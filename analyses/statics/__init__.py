@@ -1,7 +1,7 @@
 """Robots and mechanisms at rest, and the modelling errors of robots: numbers and pictures.
 
 * `solve_static`: a robot or mechanism at rest, at a pose or with given lengths.
-* Modelling errors: two models of the same robot compared, and cables with rigid rods.
+* Modelling errors: where a robot rests that is commanded by a wrong model of its cables.
 
 Pictures are imported when they are asked for, since that takes longer than the answers.
 """

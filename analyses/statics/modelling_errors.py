@@ -7,9 +7,11 @@ they were set right, so that only differences from there are wrong.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
@@ -30,7 +32,7 @@ RIGID = 1e4
 
 @dataclass(frozen=True)
 class Belief:
-    """What a controller takes the cables for.
+    """A controller's model of the cables.
 
     Attributes:
         name: What it gets wrong, for tables.
@@ -78,7 +80,7 @@ def poses_in(robot: Robot, count: int, seed: int = 0) -> list[RigidTransform]:
 
 
 def commanded_lengths(
-    robot: Robot, belief: Belief, poses: list[RigidTransform], upset: Array | None = None
+    robot: Robot, belief: Belief, poses: Sequence[RigidTransform], upset: Array | float = 0.0
 ) -> Array:
     """Unstrained lengths that a controller commands for poses, shape (k, m) [m].
 
@@ -86,76 +88,54 @@ def commanded_lengths(
         robot: The robot; its own cables sag, stretch and run over its pulleys.
         belief: The controller's model.
         poses: Wanted poses.
-        upset: What the lengths err by at home, shape (m,) [m]; None: nothing.
+        upset: What the lengths err by at home, shape (m,) [m].
     """
     home = robot.home.transform()
     right = hold_robot(robot, home, robot.cable_set(), CATENARY).unstrained_lengths
-    if upset is not None:
-        right = right + upset
-    believed = [
+    at_home, *lengths = (
         hold_robot(robot, X_WP, belief.cables, belief.model).unstrained_lengths
         for X_WP in (home, *poses)
-    ]
-    return np.array([right + each - believed[0] for each in believed[1:]])
+    )
+    return right + upset + np.array(lengths) - at_home
 
 
-@dataclass(frozen=True, eq=False)
-class PoseErrors:
-    """Where the platform comes to rest instead.
-
-    Attributes:
-        name: What the controller gets wrong.
-        distances: From the wanted poses, shape (k,) [m].
-        angles: Shape (k,) [rad].
-        taut: How many cables are taut, shape (k,).
-    """
-
-    name: str
-    distances: Array
-    angles: Array
-    taut: np.ndarray
-
-
-def pose_errors(robot: Robot, belief: Belief, poses: list[RigidTransform]) -> PoseErrors:
+def pose_errors(
+    robot: Robot, beliefs: Sequence[Belief], poses: Sequence[RigidTransform]
+) -> pd.DataFrame:
     """Errors of the pose at rest on the robot's own cables, which sag, stretch and have pulleys.
 
-    Taut are cables that are not slack: that pull on the platform with more than their weight.
+    Returns:
+        A row for each belief and pose: `belief`, its name; `distance` [m] and `angle` [rad] from
+        the wanted pose; `taut`, the number of cables that pull with more than their weight.
     """
-    true, platform = robot.cable_set(), rigid_platform(robot)
-    distances, angles, taut = [], [], []
-    for X_WP, l0 in zip(poses, commanded_lengths(robot, belief, poses), strict=True):
-        rest = equilibrium_near(true, CATENARY, platform, l0, X_WP)
-        distance, angle = pose_error(rest.X_WP, X_WP)
-        distances.append(distance)
-        angles.append(angle)
-        taut.append(int(np.sum(~rest.slack)))
-    return PoseErrors(belief.name, np.array(distances), np.array(angles), np.array(taut))
+    true, platform, rows = robot.cable_set(), rigid_platform(robot), []
+    for belief in beliefs:
+        for X_WP, l0 in zip(poses, commanded_lengths(robot, belief, poses), strict=True):
+            rest = equilibrium_near(true, CATENARY, platform, l0, X_WP)
+            distance, angle = pose_error(rest.X_WP, X_WP)
+            rows.append((belief.name, distance, angle, int(np.sum(~rest.slack))))
+    return pd.DataFrame(rows, columns=["belief", "distance", "angle", "taut"])
 
 
-def errors_figure(found: dict[str, list[PoseErrors]]) -> Figure:
+def errors_figure(errors: dict[str, pd.DataFrame]) -> Figure:
     """Median and largest error of position and rotation, by robot and belief."""
-    figure, panels = new_figure(
-        2,
-        len(found),
-        (6.0 * len(found), 8.0),
-        "Pose errors at rest, by what the controller gets wrong",
-    )
+    size, title = (6.0 * len(errors), 8.0), "Pose errors at rest, by what the controller gets wrong"
+    figure, panels = new_figure(2, len(errors), size, title)
     panels = np.reshape(panels, (2, -1))
-    for column, (robot, errors) in enumerate(found.items()):
-        places = np.arange(len(errors))
-        for row, (unit, factor) in enumerate((("mm", 1e3), ("deg", 180.0 / np.pi))):
-            values = [factor * (e.distances if row == 0 else e.angles) for e in errors]
-            axes = panels[row, column]
-            median, largest = [np.median(v) for v in values], [np.max(v) for v in values]
-            color = DISTANCE.color if row == 0 else ANGLE.color
-            axes.hlines(places, median, largest, color=color, linewidth=3.0, alpha=0.35)
-            axes.plot(median, places, "o", color=color, markersize=8, label="median")
-            axes.plot(largest, places, "|", color=color, markersize=12, label="largest")
-            axes.set_yticks(places, [e.name for e in errors])
+    for column, (robot, rows) in enumerate(errors.items()):
+        for row, (name, unit, factor, look) in enumerate(
+            (("distance", "mm", 1e3, DISTANCE), ("angle", "deg", 180.0 / np.pi, ANGLE))
+        ):
+            values = factor * rows.groupby("belief", sort=False)[name].agg(["median", "max"])
+            axes, places = panels[row, column], np.arange(len(values))
+            axes.hlines(places, values["median"], values["max"], color=look.color, linewidth=3.0,
+                        alpha=0.35)  # fmt: skip
+            axes.plot(values["median"], places, "o", color=look.color, markersize=8, label="median")
+            axes.plot(values["max"], places, "|", color=look.color, markersize=12, label="largest")
+            axes.set_yticks(places, values.index)
             axes.invert_yaxis()
-            axes.set(xlabel=f"{'distance' if row == 0 else 'angle'} [{unit}]", xscale="log")
-            if row == 0:
-                axes.set_title(robot)
+            axes.set(xlabel=f"{name} [{unit}]", xscale="log")
+        panels[0, column].set_title(robot)
     panels[0, -1].legend()
     return figure
 
@@ -192,6 +172,22 @@ class SlackPath:
         few = self.taut[np.sum(self.taut, axis=1) <= 6]
         return int(np.sum(np.any(few[1:] != few[:-1], axis=1)))
 
+    def plot(self, title: str) -> Figure:
+        """Which cables are taut along the path, and how far the platform is from it."""
+        figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
+        for i, name in enumerate(self.names):
+            above.plot(
+                self.share, np.where(self.taut[:, i], float(i), np.nan), linewidth=6.0,
+                color=nth_look(i).color, linestyle=SOLID, solid_capstyle="butt",
+            )  # fmt: skip
+            above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
+            above.text(1.01, i, name, va="center")
+        rows = (len(self.names) - 0.5, -0.5)
+        above.set(ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=rows)
+        below.plot(self.share, 1e3 * self.distances)
+        below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
+        return figure
+
 
 def slack_along_path(robot: Robot, start: Array, end: Array, count: int, upset: Array) -> SlackPath:
     """Rests an elastic robot along a straight path on lengths that are a little wrong.
@@ -219,26 +215,3 @@ def slack_along_path(robot: Robot, start: Array, end: Array, count: int, upset: 
         distances.append(pose_error(rest.X_WP, X_WP)[0])
     names = [cable.name for cable in robot.cables]
     return SlackPath(share, np.array(tensions), np.array(distances), names)
-
-
-def slack_figure(path: SlackPath, title: str) -> Figure:
-    """Which cables are taut along the path, and how far the platform is from it."""
-    figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
-    for i, name in enumerate(path.names):
-        taut = np.where(path.taut[:, i], float(i), np.nan)
-        above.plot(
-            path.share,
-            taut,
-            linewidth=6.0,
-            color=nth_look(i).color,
-            linestyle=SOLID,
-            solid_capstyle="butt",
-        )
-        above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
-        above.text(1.01, i, name, va="center")
-    above.set(
-        ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=(len(path.names) - 0.5, -0.5)
-    )
-    below.plot(path.share, 1e3 * path.distances)
-    below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
-    return figure

@@ -4,6 +4,8 @@ and contacts do beside the elastic law."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,7 +21,6 @@ from cdpr_drake.analyses.frame.figures import (
     panels,
     styled,
 )
-from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import (
     CableBehaviour,
     drum_tensions,
@@ -55,51 +56,54 @@ SWINGS = (0.7, 3.0)
 """Turns of drawn swings, over the turn at which contacts slip."""
 
 
-def rest_figure(rest: RobotAtRest, title: str) -> Figure:
+def rest_figure(rest: RobotAtRest) -> Figure:
     """The cables from the side and from above, tensions, and natural frequencies."""
-    vibrates = rest.frequencies is not None
-    words = f"{title}\ncables in the world frame W, tensions" + ", vibrations" * vibrates
-    figure = bare_figure((12.0, 9.5), words)
+    vibrates = rest.frequencies is not None  # not with inextensible cables
+    title = (
+        f"{rest.robot.name} at rest, {rest.model} cables, {rest.geometry}\n"
+        f"cables in the world frame W, tensions{', vibrations' * vibrates}"
+    )
+    figure = bare_figure((12.0, 9.5), title)
     mosaic: list[Any] = [["side", "above"], ["tensions", "modes" if vibrates else "tensions"]]
     with styled():
         axes = figure.subplot_mosaic(mosaic)
-    curves = cable_curves(rest.cables, rest.model, rest.X_WP, rest.l0, CURVE_POINTS)
-    anchors = rest.X_WP.rotation().matrix() @ rest.cables.p_PB
-    anchors = anchors + rest.X_WP.translation()[:, np.newaxis]
-    for place, (i, j), words, view in (
-        (axes["side"], (0, 2), "xz", "from the side; dotted: slack"),
-        (axes["above"], (0, 1), "xy", "from above; dotted: slack"),
-    ):
-        for k, curve in enumerate(curves):
-            slack = rest.slack[k]
-            look = nth_look(k)
-            dash = DOTTED if slack else SOLID
-            place.plot(curve[i], curve[j], linestyle=dash, color=look.color)
-            place.plot(curve[i, 0], curve[j, 0], look.marker, color=look.color, label=rest.names[k])
-        outline = _outline(anchors[[i, j]])
-        place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
-        place.set_title(view)
-        _not_flat(place)
-        place.set(xlabel=f"{words[0]} in W [m]", ylabel=f"{words[1]} in W [m]", aspect="equal")
-    axes["above"].legend(**LEGEND_BESIDE)
+    _views(axes["side"], axes["above"], rest)
     place = axes["tensions"]
     for k, tension in enumerate(rest.tensions):
         place.bar(k, tension, **bar_style(nth_look(k)))
-    place.set_xticks(range(len(rest.l0)), rest.names)
+    place.set_xticks(np.arange(len(rest.names)), rest.names)
     place.set(ylabel="tension at the platform [N]")
-    low, high = rest.robot.tension_limits()
-    for bound in (low, high):
+    for bound in rest.robot.tension_limits():
         if 0.0 < bound <= 2.0 * np.max(rest.tensions, initial=1e-9):
             place.axhline(bound, label=f"bound {bound:g} N", **line_style(BOUND))
             place.legend(loc="upper right")
             place.margins(y=0.3)  # above the bars
-    if rest.frequencies is None:  # inextensible cables
-        return figure
-    place = axes["modes"]
-    places = np.arange(len(rest.frequencies)) + 1
-    place.bar(places, rest.frequencies, color=PLATFORM.color)
-    place.set(xlabel="mode [-]", ylabel="natural frequency [Hz]", xticks=places)
+    if rest.frequencies is not None:
+        modes = np.arange(len(rest.frequencies)) + 1
+        axes["modes"].bar(modes, rest.frequencies, color=PLATFORM.color)
+        axes["modes"].set(xlabel="mode [-]", ylabel="natural frequency [Hz]", xticks=modes)
     return figure
+
+
+def _views(side: Any, above: Any, rest: RobotAtRest) -> None:
+    """Cables and platform in the planes of x and z, and of x and y."""
+    curves = cable_curves(rest.cables, rest.model, rest.X_WP, rest.l0, CURVE_POINTS)
+    anchors = rest.X_WP @ rest.cables.p_PB
+    for place, (i, j), view in ((side, (0, 2), "from the side"), (above, (0, 1), "from above")):
+        for k, curve in enumerate(curves):
+            look = nth_look(k)
+            dash = DOTTED if rest.slack[k] else SOLID
+            place.plot(curve[i], curve[j], linestyle=dash, color=look.color)
+            place.plot(curve[i, 0], curve[j, 0], look.marker, color=look.color, label=rest.names[k])
+        outline = anchors[[i, j]]
+        with suppress(QhullError):  # points on a line are drawn as they are
+            around = ConvexHull(outline.T).vertices
+            outline = outline[:, np.append(around, around[0])]
+        place.plot(*outline, color=OUTLINE.color, linestyle=SOLID, linewidth=2.0)
+        place.set_title(f"{view}; dotted: slack")
+        _not_flat(place)
+        place.set(xlabel=f"{'xyz'[i]} in W [m]", ylabel=f"{'xyz'[j]} in W [m]", aspect="equal")
+    above.legend(**LEGEND_BESIDE)
 
 
 def _not_flat(place: Any) -> None:
@@ -113,20 +117,8 @@ def _not_flat(place: Any) -> None:
     few_ticks(place.yaxis, 4)
 
 
-def _outline(points: Array) -> Array:
-    """Closed convex outline of points in a plane, shape (2, n); the points where there is none."""
-    try:
-        around = ConvexHull(points.T).vertices
-    except QhullError:
-        return points
-    return points[:, np.append(around, around[0])]
-
-
 def behaviour_figure(rest: RobotAtRest) -> Figure:
     """Force over elongation, tensions at the drums, moments of contacts: what the file says of.
-
-    Args:
-        rest: The robot at rest, whose tensions the picture is about.
 
     Raises:
         CableModelError: The file says nothing of them, or nothing that can be seen here.
@@ -135,11 +127,11 @@ def behaviour_figure(rest: RobotAtRest) -> Figure:
     behaviour, contacts = robot.cable_behaviour(), robot.contact_hysteresis()
     parts: list[Callable[[Any], None]] = []
     if behaviour.changes_lengths() or behaviour.creep_stiffness > 0.0:
-        parts.append(lambda axes: _elongation(axes, rest, behaviour))
+        parts.append(partial(_elongation, rest=rest, behaviour=behaviour))
     if rest.drums is not None:
-        parts.append(lambda axes: _drums(axes, rest, behaviour))
+        parts.append(partial(_drums, rest=rest, behaviour=behaviour))
     if contacts is not None:
-        parts.append(lambda axes: _contacts(axes, contacts))
+        parts.append(partial(_contacts, contacts=contacts))
     if not parts:
         rubs = behaviour.sheave_friction > 0.0
         what = "friction of sheaves alone, and no pulleys" if rubs else "elastic cables alone"
@@ -164,16 +156,17 @@ def _elongation(axes: Any, rest: RobotAtRest, behaviour: CableBehaviour) -> None
     at = float(strain_of_tension(np.array([t]), np.array([ES]), g)[0])
     e = np.linspace(0.0, BEYOND * max(at, t / ES), POINTS)
 
-    def elongation(strain: Any) -> Any:
-        """Elongation over the length that the winch counts [%]."""
+    def elongation(strain: Any) -> Any:  # over the length that the winch counts [%]
         return 100.0 * (longer * (1.0 + strain) - 1.0)
 
+    laws = [f"stiffening {g:g} /N"] if g > 0.0 else []
+    if behaviour.expansion * behaviour.warmer != 0.0:
+        laws.append(f"warmer by {behaviour.warmer:g} K")
     axes.plot(100.0 * e, ES * e, label="elastic law", **line_style(IDEAL))
     law = tension_of_strain(e, np.full(POINTS, ES), g)
     near = law <= BEYOND * BEYOND * t
-    axes.plot(
-        elongation(e[near]), law[near], label=_law_words(behaviour), **line_style(nth_look(0))
-    )
+    words = " and ".join(laws) or "after long"
+    axes.plot(elongation(e[near]), law[near], label=words, **line_style(nth_look(0)))
     axes.plot([elongation(at)], [t], "o", color="0.1", label=f"{rest.names[k]} at rest, {t:.3g} N")
     if behaviour.creep_stiffness > 0.0:
         tau, size = behaviour.creep_time, WAVE * at
@@ -193,32 +186,22 @@ def _elongation(axes: Any, rest: RobotAtRest, behaviour: CableBehaviour) -> None
     axes.set_ylim(bottom=0.0)
 
 
-def _law_words(behaviour: CableBehaviour) -> str:
-    said = []
-    if behaviour.stiffening > 0.0:
-        said.append(f"stiffening {behaviour.stiffening:g} /N")
-    if behaviour.expansion * behaviour.warmer != 0.0:
-        said.append(f"warmer by {behaviour.warmer:g} K")
-    return " and ".join(said) or "after long"
-
-
 def _drums(axes: Any, rest: RobotAtRest, behaviour: CableBehaviour) -> None:
     """Tension at the drum over that at the platform, of the cable that wraps the farthest."""
+    assert rest.drums is not None
     radii = np.where(rest.cables.pulley_radius > 0.0, rest.cables.pulley_radius, np.inf)
     wraps = cable_paths(rest.X_WP, rest.cables).arcs / radii
     k = int(np.argmax(wraps))
     t = np.linspace(0.0, BEYOND * float(np.max(rest.tensions)), POINTS)
+    around = np.full(POINTS, wraps[k])
     up, down = (
-        drum_tensions(
-            t, np.full(POINTS, wraps[k]), behaviour.sheave_friction, sign * np.ones(POINTS)
-        )
+        drum_tensions(t, around, behaviour.sheave_friction, np.full(POINTS, sign))
         for sign in (1.0, -1.0)
     )
     axes.fill_between(t, down, up, facecolor="0.85", label="standing: anything between")
     axes.plot(t, up, label="wound up, platform lifted", **line_style(nth_look(0)))
     axes.plot(t, t, label="without friction", **line_style(IDEAL))
     axes.plot(t, down, label="paid out, platform lowered", **line_style(nth_look(1)))
-    assert rest.drums is not None
     at = [rest.tensions[k]] * 2
     axes.plot(at, rest.drums[:, k], "o", color="0.1", label=f"{rest.names[k]} at this pose")
     axes.set(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import compress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +14,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.kinematics import pose_numbers
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import (
     CableBehaviour,
@@ -38,7 +41,6 @@ from cdpr_drake.statics.equilibrium import (
     principal_stiffnesses,
     random_starts,
 )
-from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.statics.stiffness import inextensible_modes, natural_modes, platform_stiffness
 from cdpr_drake.summaries import numbers
 
@@ -125,9 +127,8 @@ class RobotAtRest(Result):
             extras["drum_tensions_winding_up_n"] = self.drums[0].tolist()
             extras["drum_tensions_paying_out_n"] = self.drums[1].tolist()
         if self.contacts is not None:
-            extras["rests_within_rad"] = _finite(self.contacts)[0]
-            extras["held_moments_n_m"] = self.contacts[1:].tolist()
-        return {
+            extras["rests_within_rad"], *extras["held_moments_n_m"] = self.contacts.tolist()
+        numbers: dict[str, Any] = finite({
             "robot": self.robot.name,
             "cable_model": self.model,
             "pulleys": self.cables.has_pulleys(),
@@ -140,16 +141,18 @@ class RobotAtRest(Result):
             "surplus_lengths_m": self.surplus_lengths.tolist(),
             "sags_m": self.sags.tolist(),
             "stability": str(self.stability),
-            "principal_stiffnesses_n_per_m": _finite(self.principal),
+            "principal_stiffnesses_n_per_m": self.principal.tolist(),
             "stiffness": None if self.stiffness is None else self.stiffness.tolist(),
-            "frequencies_hz": None if self.frequencies is None else _finite(self.frequencies),
+            "frequencies_hz": None if self.frequencies is None else self.frequencies.tolist(),
             "modes": None if self.modes is None else self.modes.T.tolist(),
             "other_equilibria": [
                 {"pose": pose_numbers(rest.X_WP), "energy_j": rest.energy,
                  "stability": str(rest.stability)}
                 for rest in self.others
             ],
-        } | extras  # fmt: skip
+            **extras,
+        })  # fmt: skip
+        return numbers
 
     def tables(self) -> list[Table]:
         """A row for each cable."""
@@ -197,18 +200,9 @@ class RobotAtRest(Result):
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The robot at rest; and the behaviour of its cables and contacts by its file, which is
         refused where the file says nothing of it."""
-        return {"rest": self._draw, "behaviour": self._draw_behaviour}
+        from cdpr_drake.analyses.statics.rest_figures import behaviour_figure, rest_figure
 
-    def _draw(self) -> Figure:
-        from cdpr_drake.analyses.statics.rest_figures import rest_figure
-
-        return rest_figure(self, f"{self.robot.name} at rest, {self.model} cables, "
-                             f"{self.geometry}")  # fmt: skip
-
-    def _draw_behaviour(self) -> Figure:
-        from cdpr_drake.analyses.statics.rest_figures import behaviour_figure
-
-        return behaviour_figure(self)
+        return {"rest": partial(rest_figure, self), "behaviour": partial(behaviour_figure, self)}
 
 
 def frequency_words(frequencies: Array) -> str:
@@ -222,7 +216,7 @@ def static_at_pose(robot: Robot, X_WP: RigidTransform, model: str, pulleys: bool
     Raises:
         CdprError: The pose is outside the frame, or cannot be held; says why.
     """
-    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model)
     holding = hold_robot(robot, X_WP, cables, model)
     tensions, l0 = holding.tensions, holding.unstrained_lengths
     if not behaviour.changes_lengths():
@@ -253,7 +247,7 @@ def static_at_lengths(
     Raises:
         CdprError: No pose in the frame has these lengths without breaking a cable; by how much.
     """
-    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model, pulleys)
+    cables, behaviour = robot.cable_set(pulleys), _behaviour(robot, model)
     if not behaviour.changes_lengths():
         return _at_lengths(robot, cables, l0, model, seed)
     tensions = np.zeros(cables.count)
@@ -277,19 +271,17 @@ def _at_lengths(robot: Robot, cables: CableSet, l0: Array, model: str, seed: int
     if robot.plane_height is not None:
         lower[2] = robot.plane_height
     random = random_starts(lower, robot.frame.upper, STARTS, seed, platform.motion)
-    starts = [
-        robot.home.transform(), *(random if joint.is_as_world() else map(joint.nearest, random))
-    ]  # fmt: skip
+    starts = [robot.home.transform()]
+    starts += random if joint.is_as_world() else map(joint.nearest, random)
     check_model(model, cables)
     elastic = model if CABLE_MODELS[model].law != STRAIGHT else "elastic"
     # Elastic cables always come to rest somewhere; the tension they need there tells whether the
     # lengths make sense.
     rests = equilibria(cables, elastic, platform, l0, starts)
     low, high = robot.frame.bounds()
-    inside = [
-        rest for rest in rests
-        if np.all(rest.X_WP.translation() >= low) and np.all(rest.X_WP.translation() <= high)
-    ]  # fmt: skip
+    places = np.array([rest.X_WP.translation() for rest in rests])
+    within = np.all((low <= places) & (places <= high), axis=1)
+    inside = list(compress(rests, within))
     if not inside:
         check_pose(robot, rests[0].X_WP)
     strength = np.minimum(cables.breaking_load, LARGEST_STRAIN * cables.stiffness)
@@ -303,35 +295,27 @@ def _at_lengths(robot: Robot, cables: CableSet, l0: Array, model: str, seed: int
             f"{rest.tensions[i]:.4g} N; accepted: at most its breaking load, {strength[i]:.4g} N"
         )
     if not CABLE_MODELS[model].extensible:
-        bearable = _made_inextensible(cables, platform, l0, bearable)
+        elastic_rests, bearable = bearable, []
+        for rest in elastic_rests:
+            with suppress(EquilibriumError):
+                rigid = equilibrium_near(cables, INEXTENSIBLE, platform, l0, rest.X_WP)
+                bearable.append(rigid)
+        if not bearable:
+            best = min(elastic_rests, key=lambda rest: float(np.max(rest.tensions)))
+            stretch = best.tensions * l0 / cables.stiffness
+            i = int(np.argmax(stretch))
+            raise EquilibriumError(
+                f"lengths: no pose has them with inextensible cables; at best cable {i + 1} would "
+                f"have to be {1e3 * stretch[i]:.3g} mm longer"
+            )
     lowest = min(bearable, key=lambda rest: rest.energy)
     others = [rest for rest in bearable if rest is not lowest]
-    return _at_rest(
-        robot, cables, model, lowest.X_WP, l0, lowest.tensions, others=others, rest=lowest
-    )
-
-
-def _made_inextensible(
-    cables: CableSet, platform: RigidPlatform, l0: Array, elastic: list[Equilibrium]
-) -> list[Equilibrium]:
-    rigid = []
-    for rest in elastic:
-        with suppress(EquilibriumError):
-            rigid.append(equilibrium_near(cables, INEXTENSIBLE, platform, l0, rest.X_WP))
-    if not rigid:
-        best = min(elastic, key=lambda rest: float(np.max(rest.tensions)))
-        stretch = best.tensions * l0 / cables.stiffness
-        i = int(np.argmax(stretch))
-        raise EquilibriumError(
-            f"lengths: no pose has them with inextensible cables; at best cable {i + 1} would have "
-            f"to be {1e3 * stretch[i]:.3g} mm longer"
-        )
-    return rigid
+    return _at_rest(robot, cables, model, lowest.X_WP, l0, lowest.tensions, others, lowest)
 
 
 def _at_rest(
     robot: Robot, cables: CableSet, model: str, X_WP: RigidTransform, l0: Array, tensions: Array,
-    *, others: Sequence[Equilibrium] = (), rest: Equilibrium | None = None,
+    others: Sequence[Equilibrium] = (), rest: Equilibrium | None = None,
 ) -> RobotAtRest:  # fmt: skip
     """Stiffness, vibrations and sag at a pose of rest; `rest` has its stability if it is known."""
     platform, arm = rigid_platform(robot), anchor_arm(cables)
@@ -364,16 +348,10 @@ def _at_rest(
     )  # fmt: skip
 
 
-def _behaviour(robot: Robot, model: str, pulleys: bool) -> CableBehaviour:
-    """What the robot's cables do beside the elastic law.
-
-    Raises:
-        CableModelError: The model, or the robot's pulleys, do not go with it.
-    """
-    behaviour = robot.cable_behaviour()
-    known = CABLE_MODELS.get(model)
-    elastic = known is not None and known.extensible and known.law == STRAIGHT
-    if behaviour.changes_lengths() and known is not None and not elastic:
+def _behaviour(robot: Robot, model: str) -> CableBehaviour:
+    """What the robot's cables do beside the elastic law; refuses models that do not go with it."""
+    behaviour, law = robot.cable_behaviour(), CABLE_MODELS.get(model)
+    if behaviour.changes_lengths() and law and not (law.extensible and law.law == STRAIGHT):
         raise CableModelError(
             f"cable model: found {model} for cables that stiffen or are warm, see cable.behaviour "
             f"of {robot.name}; accepted: elastic, kelvin_voigt"
@@ -382,11 +360,7 @@ def _behaviour(robot: Robot, model: str, pulleys: bool) -> CableBehaviour:
 
 
 def _drums(robot: Robot, cables: CableSet, X_WP: RigidTransform, tensions: Array) -> Array | None:
-    """Tensions at the drums, wound up and paid out, shape (2, m) [N]; None without friction.
-
-    Raises:
-        CableModelError: Cables run over pulleys at the platform, too.
-    """
+    """Tensions at the drums, wound up and paid out, shape (2, m) [N]; None without friction."""
     friction = robot.cable_behaviour().sheave_friction
     if friction == 0.0 or not cables.has_pulleys():
         return None
@@ -403,23 +377,14 @@ def _drums(robot: Robot, cables: CableSet, X_WP: RigidTransform, tensions: Array
 def _contacts(robot: Robot, K: Array, X_WP: RigidTransform) -> Array | None:
     """How far the platform may rest beside a pose [rad], and held moments [N m], shape (4,).
 
-    Infinite where the pose is not stable.
-
-    Args:
-        robot: The robot.
-        K: Stiffness of the motions that it has, shape (n, n).
-        X_WP: The pose.
+    Infinite where the pose is not stable, by the stiffness K of the motions that the robot has.
     """
     contacts = robot.contact_hysteresis()
     if contacts is None:
         return None
-    R, motion = X_WP.rotation().matrix(), robot.motion_type()
-    B = motion.basis(R)
+    R = X_WP.rotation().matrix()
+    B = robot.motion_type().basis(R)
     if np.min(np.linalg.eigvalsh(0.5 * (K + K.T))) <= 0.0:
         return np.array([np.inf, *contacts.held_moments()])
     compliance = (B @ np.linalg.inv(K) @ B.T)[:3, :3]
     return np.array([contacts.turns_of_rest(compliance, R), *contacts.held_moments()])
-
-
-def _finite(values: Array) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]

@@ -124,15 +124,13 @@ class MechanismAtRest(Result):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """Tensions with the file's bounds."""
-        return {"tensions": self._draw}
-
-    def _draw(self) -> Figure:
         from cdpr_drake.analyses.tension_figures import tension_figure
 
         mechanism, geometry = self.placed.mechanism, self.placed.geometry
         lower, upper = (np.full(len(self.names), bound) for bound in mechanism.tension_limits())
         title = f"{mechanism.name} at rest, {geometry}: {self.rest.stability}"
-        return tension_figure(self.names, {"at rest": self.rest.tensions}, (lower, upper), title)
+        tensions = {"at rest": self.rest.tensions}
+        return {"tensions": lambda: tension_figure(self.names, tensions, (lower, upper), title)}
 
 
 @verb()

@@ -306,8 +306,8 @@ def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
         words = f"found {' '.join(problem.unused_tokens or ())!r}{form}; accepted: fewer words"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
         option, info = problem.argument.name, problem.argument.field_info
-        if info.required and option == f"--{info.name}":  # it has no other name than its place
-            option = option.lstrip("-").upper()
+        if info.kind is not info.KEYWORD_ONLY and option == f"--{info.name}":
+            option = option.lstrip("-").upper()  # it has no other name than its place
         words = f"{option}: found nothing; accepted: a value"
     return f"{words}; see cdpr {name} --help".replace("  ", " ")
 

@@ -104,7 +104,7 @@ class ValueCost(ProgramCost):
 
     def __init__(self, function: Function, matrix: Array, offset: Array, scale: float) -> None:
         """As of `ValueFunction`."""
-        self._rows = ValueFunction(function, matrix, offset, scale)
+        self._rows: ProgramFunction = ValueFunction(function, matrix, offset, scale)
 
     def value(self, x: Array) -> tuple[float, Array]:
         """Cost and gradient."""

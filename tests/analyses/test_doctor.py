@@ -1,42 +1,45 @@
 """The doctor finds what is missing and says the remedy."""
 
+import pytest
+
 from cdpr_drake.analyses import installation as doctor
 from cdpr_drake.errors import RenderingError
+from tests.cli.commands import told
 
 
-def test_this_machine_is_well():
-    findings = doctor.examine_installation().findings
-    assert [f for f in findings if not f.passed] == []
-    assert {"Python", "drake", "EGL", "rendered camera"} <= {f.check for f in findings}
+def test_this_machine_is_well(capsys):
+    checks = {entry["check"]: entry["passed"] for entry in told(capsys, "doctor")}
+    assert all(checks.values())
+    assert {"Python", "drake", "EGL", "rendered camera", "gymnasium"} <= set(checks)
 
 
-def test_missing_egl_is_named(monkeypatch):
-    def missing():
-        raise RenderingError("no libEGL.so.1")
-
-    monkeypatch.setattr(doctor, "check_rendering", missing)
-    monkeypatch.setattr(doctor, "CHECKS", (doctor._egl, doctor._python))
-    egl, python = doctor.examine_installation().findings
-    assert not egl.passed
-    assert "libegl1" in egl.remedy
-    assert python.passed
+def missing():
+    raise RenderingError("no libEGL.so.1")
 
 
-def test_a_crash_of_the_renderer_is_a_finding(monkeypatch):
-    monkeypatch.setattr(doctor, "_RENDER_PROGRAM", "import os; os.abort()")
-    finding = doctor._rendering()
-    assert not finding.passed
-    assert "projected" in finding.remedy
+@pytest.mark.parametrize(
+    ("name", "value", "check", "remedy"),
+    [
+        ("check_rendering", missing, lambda: doctor._egl(), "libegl1"),
+        ("_RENDER_PROGRAM", "import os; os.abort()", lambda: doctor._rendering(), "projected"),
+        ("GRAPHICS", "", lambda: doctor._package("no-package", "no_module"), "pip install"),
+    ],
+    ids=["EGL", "a crash of the renderer", "package"],
+)
+def test_a_check_that_fails_names_the_remedy_and_the_rest_still_run(
+    monkeypatch, name, value, check, remedy
+):
+    monkeypatch.setattr(doctor, name, value)
+    monkeypatch.setattr(doctor, "CHECKS", (check, doctor._python))
+    examination = doctor.examine_installation()
+    failed, python = examination.as_dict()
+    assert examination.exit_code == 1
+    assert not failed["passed"]
+    assert remedy in failed["remedy"]
+    assert (python["passed"], python["remedy"]) == (True, "")
 
 
 def test_what_is_optional_and_absent_is_no_fault_but_named():
     finding = doctor._extra("no-such-package", "gym", "learning environments")
     assert finding.passed
     assert "pip install 'cdpr_drake[gym]'" in finding.found
-    assert "gymnasium" in {one.check for one in doctor.examine_installation().findings}
-
-
-def test_missing_package_is_named():
-    finding = doctor._package("no-such-package", "no_such_module")
-    assert not finding.passed
-    assert "pip install" in finding.remedy

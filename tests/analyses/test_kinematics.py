@@ -11,6 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import least_squares
 
 import cdpr_drake as cdpr
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
@@ -31,85 +32,68 @@ def moved(X_WP, k, step):
     return RigidTransform(turn @ X_WP.rotation(), X_WP.translation() + shift)
 
 
+def lengths_at(robot, X_WP, pulleys=True):
+    """Lengths at any pose, also where a planar robot cannot be."""
+    return cable_paths(X_WP, robot.cable_set(pulleys)).lengths
+
+
 @pytest.mark.parametrize("name", ["acrobot_large", "caroca", "planar"])
 @pytest.mark.parametrize("pulleys", [True, False])
 def test_lengths_directions_and_wrench_matrix_agree_by_differences(name, pulleys):
     robot = load_robot(name)
     X_WP = robot.home.transform()
-    found = cdpr.solve_inverse_kinematics(name, X_WP, pulleys=pulleys)
-    assert found.geometry == robot.geometry_words(pulleys)
+    result = cdpr.solve_inverse_kinematics(name, X_WP, pulleys=pulleys)
+    assert result.geometry == robot.geometry_words(pulleys)
     slopes = []
     for k in range(6):
-        ends = [cdpr_lengths(robot, moved(X_WP, k, side * STEP), pulleys) for side in (1, -1)]
-        slopes.append((ends[0] - ends[1]) / (2.0 * STEP))
-    np.testing.assert_allclose(found.directions, slopes[3:], atol=1e-8)
+        more, less = (lengths_at(robot, moved(X_WP, k, s * STEP), pulleys) for s in (1, -1))
+        slopes.append((more - less) / (2.0 * STEP))
+    np.testing.assert_allclose(result.directions, slopes[3:], atol=1e-8)
     W = -np.array(slopes)
     rows = [2, 3, 4] if robot.is_planar() else range(6)
     np.testing.assert_allclose(robot.wrench_matrix(pulleys=pulleys), W[rows], atol=1e-8)
-    cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
-    expected = tension_problem(robot, X_WP, cables=cables).W
+    expected = tension_problem(robot, X_WP, cables=robot.cable_set(pulleys)).W
     np.testing.assert_array_equal(robot.wrench_matrix(X_WP, pulleys), expected)
-
-
-def cdpr_lengths(robot, X_WP, pulleys):
-    """Lengths at any pose, also where a planar robot cannot be."""
-    from cdpr_drake.geometry.cable_paths import cable_paths
-
-    cables = robot.cable_set()
-    return cable_paths(X_WP, cables if pulleys else cables.without_pulleys()).lengths
 
 
 def test_lengths_without_pulleys_are_distances():
     robot = load_robot("acrobot_large")
-    pose = cdpr.Pose(position=np.array(POSE[:3]), angles_deg=np.array(POSE[3:]))
-    found = cdpr.solve_inverse_kinematics(robot, POSE, pulleys=False)
-    spans = pose.transform() @ robot.anchor_points() - robot.exit_points()
-    np.testing.assert_allclose(found.lengths, np.linalg.norm(spans, axis=0), rtol=1e-14)
-    np.testing.assert_allclose(found.directions, spans / found.lengths, atol=1e-14)
-    assert as_json(found)["lengths_m"] == found.lengths.tolist()
-    assert "pulleys ignored" in shows_itself(found)
+    result = cdpr.solve_inverse_kinematics(robot, POSE, pulleys=False)
+    spans = result.X_WP @ robot.anchor_points() - robot.exit_points()
+    np.testing.assert_allclose(result.lengths, np.linalg.norm(spans, axis=0), rtol=1e-14)
+    np.testing.assert_allclose(result.directions, spans / result.lengths, atol=1e-14)
+    assert as_json(result)["lengths_m"] == result.lengths.tolist()
+    assert "pulleys ignored" in shows_itself(result)
     assert "with pulleys of" in shows_itself(cdpr.solve_inverse_kinematics(robot, POSE))
     one_line(lambda: cdpr.solve_inverse_kinematics(robot, [9.0, 0.0, 0.3]), "outside the frame")
 
 
 def test_a_robot_is_drawn_by_name_or_as_itself(planar):
-    for robot in ("planar", planar):
-        assert isinstance(cdpr.plot(robot), Figure)
-    assert isinstance(cdpr.plot("acrobot_large", POSE), Figure)
+    for arguments in (("planar",), (planar,), ("acrobot_large", POSE)):
+        assert isinstance(cdpr.plot(*arguments), Figure)
 
 
 def test_poses_of_three_and_six_numbers_are_poses():
     """In metres and degrees, as `--pose` of commands takes them."""
-    position, angles = np.array(POSE[:3]), np.array(POSE[3:])
-    forms = {
-        "six": [POSE, tuple(POSE), np.array(POSE),
-                cdpr.Pose(position=position, angles_deg=angles)],
-        "three": [POSE[:3], RigidTransform(RotationMatrix(), POSE[:3])],
-    }  # fmt: skip
-    calls = (
-        lambda pose: cdpr.solve_inverse_kinematics("acrobot_large", pose).lengths,
-        lambda pose: cdpr.solve_tensions("acrobot_large", pose).tensions,
-        lambda pose: cdpr.solve_static("acrobot_large", pose).lengths,
-        lambda pose: load_robot("acrobot_large").wrench_matrix(pose),
-    )
-    for poses in forms.values():
-        for call in calls:
-            answers = [call(pose) for pose in poses]
-            for answer in answers[1:]:
-                np.testing.assert_array_equal(answer, answers[0])
-    robot = load_robot("acrobot_large")
+    robot, position, angles = load_robot("acrobot_large"), np.array(POSE[:3]), np.array(POSE[3:])
+    six = [POSE, tuple(POSE), np.array(POSE), cdpr.Pose(position=position, angles_deg=angles)]
+    three = [POSE[:3], RigidTransform(RotationMatrix(), POSE[:3])]
+    for call in (
+        lambda pose: cdpr.solve_inverse_kinematics(robot, pose).lengths,
+        lambda pose: cdpr.solve_tensions(robot, pose).tensions,
+        lambda pose: cdpr.solve_static(robot, pose).lengths,
+        robot.wrench_matrix,
+    ):
+        for forms in (six, three):
+            first, *others = map(call, forms)
+            for other in others:
+                np.testing.assert_array_equal(other, first)
     for wrong in ([0.1, 0.2], [0.1] * 5, [np.nan, 0.0, 0.3], [[0.1, 0.0, 0.3]], "0,0,0.3", 3):
         one_line(lambda wrong=wrong: robot.wrench_matrix(wrong), "pose: found", "phi, theta, psi")
 
 
 NOISE = 1e-5
 """Standard deviation of measured lengths [m]."""
-
-
-def pose_error(fit, X_WP):
-    """Rotation vector and translation from a pose to the one that was found, shape (6,)."""
-    turn = rotation_vector(fit.X_WP.rotation() @ X_WP.rotation().inverse())
-    return np.concatenate([turn, fit.X_WP.translation() - X_WP.translation()])
 
 
 def test_measured_lengths_give_the_pose_with_its_deviation():
@@ -119,7 +103,9 @@ def test_measured_lengths_give_the_pose_with_its_deviation():
     squares, scatters = [], []
     for _ in range(200):
         fit = cdpr.solve_forward_kinematics(robot, truth.lengths + random.normal(0.0, NOISE, 8))
-        error = pose_error(fit, truth.X_WP)
+        turn = rotation_vector(fit.X_WP.rotation() @ truth.X_WP.rotation().inverse())
+        shift = fit.X_WP.translation() - truth.X_WP.translation()
+        error = np.concatenate([turn, shift])
         squares.append(error @ np.linalg.solve(fit.fit.covariance(NOISE), error))
         scatters.append(fit.fit.scatter() ** 2)
         assert not fit.remarks()
@@ -145,7 +131,7 @@ def test_no_other_pose_has_smaller_squares(name):
         twist = motion.basis(fit.X_WP.rotation().matrix()) @ x
         R = rotation_from_vector(twist[:3]) @ fit.X_WP.rotation()
         X_WP = RigidTransform(R, fit.X_WP.translation() + twist[3:])
-        return cdpr_lengths(robot, X_WP, True) - lengths
+        return lengths_at(robot, X_WP) - lengths
 
     start = np.full(motion.freedom, 1e-3)
     other = least_squares(residuals, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)

@@ -334,7 +334,7 @@ def test_points_outside_frame_and_platform_are_remarked(tmp_path):
     assert beyond.startswith(words)
     path = tmp_path / "robot.yaml"
     path.write_text(yaml.safe_dump(changed(**off), sort_keys=False))
-    assert check_files([path]).files[0].notes[:2] == [outside, beyond]
+    assert check_files([path]).entries[0]["notes"][:2] == [outside, beyond]
     assert point_notes(robot(**off, frame__assumed=True)) == [beyond]
 
 

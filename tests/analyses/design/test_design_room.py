@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.design.candidates import Mirror, MovedPoints
-from cdpr_drake.analyses.design.search_methods import (
-    EvolutionSearch,
-    SlopeSearch,
-    default_population,
-    pareto_front,
-)
+from cdpr_drake.analyses.design.search import climb, evolve, pareto_front
 from cdpr_drake.errors import DesignError
 
 REACH = np.full((3, 4), 0.1)
@@ -27,29 +22,28 @@ def test_without_ties_every_coordinate_moves_by_itself():
     assert np.count_nonzero(points.displacements(x)) == 1
 
 
-def test_two_mirrors_leave_the_moves_of_one_point_of_four():
-    """C1 and C2 across x, C3 and C4 across x, C1 and C4 and C2 and C3 across y."""
-    mirrors = [Mirror((0,), 0, 1), Mirror((0,), 3, 2), Mirror((1,), 0, 3), Mirror((1,), 1, 2)]
-    points = MovedPoints(REACH, mirrors)
+@pytest.mark.parametrize(
+    ("count", "mirrors", "signs"),
+    [
+        (2, [Mirror((0, 1), 0, 1)], [(-1, -1, 1)]),  # half a turn
+        # C1 and C2 across x, C3 and C4 across x, C1 and C4 and C2 and C3 across y.
+        (4, [Mirror((0,), 0, 1), Mirror((0,), 3, 2), Mirror((1,), 0, 3), Mirror((1,), 1, 2)],
+         [(-1, 1, 1), (-1, -1, 1), (1, -1, 1)]),
+    ],
+)  # fmt: skip
+def test_mirrors_leave_the_moves_of_one_point(count, mirrors, signs):
+    points = MovedPoints(REACH[:, :count], mirrors)
     assert points.size == 3
-    moved = points.displacements(np.array([1.0, 0.75, 0.0]))
-    first = moved[:, 0]
+    first, *others = points.displacements(np.array([1.0, 0.75, 0.0])).T
     assert np.abs(first) == pytest.approx([0.1, 0.05, 0.1])
-    for column, signs in ((1, (-1, 1, 1)), (2, (-1, -1, 1)), (3, (1, -1, 1))):
-        assert moved[:, column] == pytest.approx(first * signs)
+    for moved, sign in zip(others, signs, strict=True):
+        assert moved == pytest.approx(first * sign)
 
 
 def test_a_point_on_the_plane_stays_on_it():
     points = MovedPoints(REACH[:, :1], [Mirror((0,), 0, 0)])
     assert points.size == 2
     assert points.displacements(np.ones(2))[0, 0] == 0.0
-
-
-def test_half_a_turn_changes_two_signs():
-    points = MovedPoints(REACH[:, :2], [Mirror((0, 1), 0, 1)])
-    assert points.size == 3
-    moved = points.displacements(np.array([1.0, 0.75, 0.0]))
-    assert moved[:, 1] == pytest.approx(moved[:, 0] * [-1, -1, 1])
 
 
 def test_the_smallest_box_of_those_that_are_tied_counts():
@@ -64,34 +58,41 @@ def test_the_front():
     assert pareto_front(values).tolist() == [True, True, True, False, False, False, False]
 
 
+def answered(search, values):
+    """All designs that a search asks for, with the goals that a function gives them."""
+    designs = [next(search)]
+    try:
+        while True:
+            designs.append(search.send(values(designs[-1])))
+    except StopIteration:
+        return designs
+
+
 def test_evolution_finds_the_top_and_replays():
     pytest.importorskip("cmaes")
     top = np.array([0.3, 0.8, 0.6])
 
-    def run(rounds):
-        search, asked = EvolutionSearch(3, default_population(3), seed=4), []
-        for _ in range(rounds):
-            X = search.ask()
-            asked.append(X)
-            scores = -np.sum((X - top) ** 2, axis=1)
-            scores[0] = np.nan  # a design that cannot be
-            search.tell(scores)
-        return asked
+    def values(X):
+        goals = -np.sum((X - top) ** 2, axis=1)
+        goals[0] = np.nan  # a design that cannot be
+        return goals[:, np.newaxis]
 
-    asked = run(40)
-    assert np.all(np.concatenate(asked) >= 0.0)
-    assert np.all(np.concatenate(asked) <= 1.0)
-    assert np.mean(asked[-1], axis=0) == pytest.approx(top, abs=0.02)
-    for one, two in zip(asked, run(5), strict=False):
-        assert np.array_equal(one, two)
+    def run(generations):
+        return answered(evolve(3, 7, generations, 4, lambda goals: goals[:, 0]), values)
+
+    designs = run(40)
+    assert len(designs) == 40
+    assert np.all(np.concatenate(designs) >= 0.0)
+    assert np.all(np.concatenate(designs) <= 1.0)
+    assert np.mean(designs[-1], axis=0) == pytest.approx(top, abs=0.02)
+    for first, second in zip(designs, run(5), strict=False):
+        assert np.array_equal(first, second)
 
 
-def test_what_cannot_be_searched_is_said(monkeypatch):
-    with pytest.raises(DesignError, match="nothing that may move"):
-        EvolutionSearch(0, 4, seed=0)
+def test_a_package_that_is_not_installed_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "cmaes", None)
     with pytest.raises(DesignError, match="pip install"):
-        EvolutionSearch(2, 4, seed=0)
+        next(evolve(2, 4, 1, 0, np.ravel))
 
 
 def test_slopes_lead_between_functions_to_the_largest_least():
@@ -101,21 +102,23 @@ def test_slopes_lead_between_functions_to_the_largest_least():
     def values(x):
         return np.append(A @ x + [0.0, 0.6, 0.9], 0.5 - np.sum((x - 0.4) ** 2))
 
-    def slopes(x):
-        return np.vstack([A, -2.0 * (x - 0.4)])
+    def slopes_at(x):
+        return values(x), np.vstack([A, -2.0 * (x - 0.4)])
 
-    search, asked = SlopeSearch(2), 0
-    while not search.ended:
-        x = search.ask()
-        asked += 1
-        search.tell(float(np.min(values(x))), values(x), slopes(x))
+    designs = answered(climb(2, 30, slopes_at), lambda x: np.array([[np.min(values(x[0]))]]))
     grid = np.stack(np.meshgrid(*[np.linspace(0.0, 1.0, 401)] * 2), axis=-1).reshape(-1, 2)
     best = max(float(np.min(values(x))) for x in grid)
-    assert search.value >= best - 1e-9
-    assert asked < 30
+    assert max(float(np.min(values(x[0]))) for x in designs) >= best - 1e-9
+    assert len(designs) < 30
+
+
+def test_steps_shrink_where_slopes_promise_too_much():
+    def slopes_at(x):
+        return -((x - 0.37) ** 2), -2.0 * (x - 0.37)[:, np.newaxis]
+
+    designs = answered(climb(1, 60, slopes_at), lambda X: -((X - 0.37) ** 2))
+    assert min(abs(X[0, 0] - 0.37) for X in designs) < 1e-3
 
 
 def test_a_first_design_that_is_refused_ends_the_search():
-    search = SlopeSearch(3)
-    search.tell(float("nan"), np.empty(0), np.empty((0, 3)))
-    assert search.ended
+    assert len(answered(climb(3, 9, None), lambda x: np.array([[np.nan]]))) == 1
