@@ -42,24 +42,17 @@ if TYPE_CHECKING:
 
     from cdpr_drake.analyses.planning.plans import Plan
 
-MODELS = (ELASTIC, CATENARY)
-"""Cable models whose tension follows from their length."""
+MODELS = (ELASTIC, CATENARY)  # cable models whose tension follows from their length
 
 LENGTHS, ANGLES, CHECK = "lengths.csv", "motor_angles.csv", "stream.json"
 
-RATES = (1.0, 10_000.0)
-"""Least and largest rate of a stream [Hz]."""
-
-BETWEEN = 4
-"""Instants between two points at which tensions are asked."""
+RATES = (1.0, 10_000.0)  # least and largest rate of a stream [Hz]
+BETWEEN = 4  # instants between two points at which tensions are asked
 
 MOST_POINTS = 200_000
 
-ROUNDS = 40
-"""Steps of Newton for a sagging cable; six do, a cable that starts slack takes more."""
-
-CLOSE = 1e-9
-"""Of the tension, where they end."""
+ROUNDS = 40  # steps of Newton for a sagging cable; six do, a cable that starts slack takes more
+CLOSE = 1e-9  # of the tension, where they end
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -39,17 +39,13 @@ LEAST = ("time", "tension", "energy")
 """What a motion has least of: its time; the mean square of the tensions, in a given time; that
 integrated over a time that is free or given."""
 
-NEAREST = 0.1
-"""Default of the least depth of points that stay in view [m]."""
-
-SHORTEST, LONGEST = 0.05, 60.0
-"""Times of a motion [s]."""
+NEAREST = 0.1  # default of the least depth of points that stay in view [m]
+SHORTEST, LONGEST = 0.05, 60.0  # times of a motion [s]
 
 GUESSED_SPEED = 0.2
 """Of Po, for a first guess of the time where the straight line cannot be followed [m/s]."""
 
-END_MISSED = 1e-6
-"""An end that misses a distance by less keeps it [m]: the solver is no more exact."""
+END_MISSED = 1e-6  # an end that misses a distance by less keeps it [m]: the solver is no more exact
 
 GUESS_WITHIN = 1e-3
 """By which the ends of a guess may be off [m, rad]: files have rounded numbers, and the solver
@@ -58,20 +54,14 @@ keeps the ends by itself."""
 GUESSES = (1.3, 2.5, 5.0)
 """Times from which a solver starts, over the least along the straight line, until it succeeds."""
 
-LOOKS = 80
-"""Poses of a way that are looked at."""
-
-DIRECTIONS = 8
-"""Directions across the straight line into which ways lead."""
-
-STEPS = 24
-"""Distances from the straight line that are tried in a direction, up to its length."""
+LOOKS = 80  # poses of a way that are looked at
+DIRECTIONS = 8  # directions across the straight line into which ways lead
+STEPS = 24  # distances from the straight line that are tried in a direction, up to its length
 
 SHARES = (0.0, 0.2, 0.5)
 """Of the straight line: where a way leaves it and, from the other end, comes back to it."""
 
-MOST_DETOURS = 4
-"""Ways that are given, each in a direction of its own."""
+MOST_DETOURS = 4  # ways that are given, each in a direction of its own
 
 Guess: TypeAlias = PosePath | TimedPath | None
 """Where the solver starts; None: the straight line."""

@@ -67,11 +67,8 @@ from cdpr_drake.workspaces.cable_interference import (
 USES = ("tensions and torques", "cable speeds", "cable accelerations", "speed of Po")
 """Columns of `MotionSamples.uses`."""
 
-LOOKS = 200
-"""Instants at which distances and the view are checked, from start to goal."""
-
-TOLERANCE = 2e-5
-"""A distance that is missed by less is kept [m]: plans refine to about half of it."""
+LOOKS = 200  # instants at which distances and the view are checked, from start to goal
+TOLERANCE = 2e-5  # a distance that is missed by less is kept [m]: plans refine to about half of it
 
 
 def points(word: str) -> Array:

@@ -23,14 +23,12 @@ import numpy as np
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.trajectories.curved_path import Arc, Move
 
-AXES = "XYZABC"
-"""Words of coordinates: lengths in the file's unit, then angles [deg]."""
+AXES = "XYZABC"  # words of coordinates: lengths in the file's unit, then angles [deg]
 
 PLANES = {17.0: (0, 1, 2), 18.0: (2, 0, 1), 19.0: (1, 2, 0)}
 """First, second and third axis of the planes of arcs, right-handed."""
 
-OFFSETS = "IJK"
-"""Words of an arc's centre along x, y, z."""
+OFFSETS = "IJK"  # words of an arc's centre along x, y, z
 
 IDLE = {
     4.0: "dwell", 10.0: "retraction", 11.0: "retraction undone", 15.0: "polar coordinates off",
@@ -53,8 +51,7 @@ M_CODES = {
 }  # fmt: skip
 """M codes by name, where many write the same; all are left out."""
 
-END = {2.0, 30.0}
-"""M codes after which nothing is read."""
+END = {2.0, 30.0}  # M codes after which nothing is read
 
 SHARED = 10.0
 """M codes from here on, but M30, own the other words of their line, as printers write them."""
@@ -65,15 +62,13 @@ OTHER = {
 }  # fmt: skip
 """Letters that move no platform."""
 
-PARAMETERS = "PQHDL"
-"""Letters that belong to a code that is left out."""
+PARAMETERS = "PQHDL"  # letters that belong to a code that is left out
 
 RADII = {1e-3: 2e-6, 0.0254: 5.08e-6}
 """By how much the distances of an arc's start and end from its centre may differ: 0.002 mm, or
 0.0002 inch (NIST IR 6556, 3.5.3.2), by the unit [m]."""
 
-SAME = 1e-9
-"""Points of an arc that are closer are one: a whole circle [m]."""
+SAME = 1e-9  # points of an arc that are closer are one: a whole circle [m]
 
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _COMMENT = re.compile(r"\([^)]*\)|;.*$")

@@ -34,11 +34,8 @@ from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.proven_sets import PoseSets
 from cdpr_drake.workspaces.timed_sets import TimedSets
 
-PLATFORM_KIND = "collision-free"
-"""The kind that keeps the platform off obstacles."""
-
-JUDGED = 2000
-"""Samples of a motion that are judged by the exact checks of poses."""
+PLATFORM_KIND = "collision-free"  # the kind that keeps the platform off obstacles
+JUDGED = 2000  # samples of a motion that are judged by the exact checks of poses
 
 MOVING_CHECKS = ("cables off what moves", "platform off what moves")
 """Names of the checks in addition to the kinds."""

@@ -20,8 +20,7 @@ from cdpr_drake.trajectories.curved_path import STRAIGHT, Move
 COLUMNS = ("x", "y", "z", "phi", "theta", "psi")
 """Of a table: position in W [m], and angles, R = Rx(phi) Ry(theta) Rz(psi) [deg]."""
 
-G_CODE = (".gcode", ".nc", ".ngc", ".tap")
-"""Endings of G-code."""
+G_CODE = (".gcode", ".nc", ".ngc", ".tap")  # endings of G-code
 
 
 @dataclass(frozen=True)

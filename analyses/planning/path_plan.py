@@ -59,8 +59,7 @@ from cdpr_drake.planning.resistance import CornerMargins, resisted_along, wrench
 
 TRACKING = "computed torque, which tracking needs"
 
-ALONG = "way s along the path [m], turns by the length scale"
-"""Label of axes."""
+ALONG = "way s along the path [m], turns by the length scale"  # label of axes
 
 
 def _waypoints(word: str) -> list[Any]:

@@ -19,8 +19,7 @@ from cdpr_drake.planning.path_task import MotionSamples
 BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
 """Place of a legend."""
 
-CROWDED = 24
-"""Rows of limits that a figure shows; of more, those that are reached longest."""
+CROWDED = 24  # rows of limits that a figure shows; of more, those that are reached longest
 
 
 @dataclass(frozen=True, eq=False)

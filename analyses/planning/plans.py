@@ -37,8 +37,7 @@ from cdpr_drake.trajectories.timed_path import TimedPath
 
 SUMMARY, MOTION = "summary.json", "motion.csv"
 
-REACHED = 0.99
-"""A limit counts as reached from this share of it on."""
+REACHED = 0.99  # a limit counts as reached from this share of it on
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)

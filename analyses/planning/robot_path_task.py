@@ -31,8 +31,7 @@ from cdpr_drake.trajectories.curved_path import Move, curved_path, points_on_arc
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
-UPWARDS = 5
-"""Row of a spatial vector along which the weight acts."""
+UPWARDS = 5  # row of a spatial vector along which the weight acts
 
 CORNERS = ("smooth", "blend", "rest")
 """What a path does at its poses: a spline through them, straight lines with rounded corners, or
@@ -41,8 +40,7 @@ straight lines with a rest in each corner."""
 RESERVE = 0.05
 """Default of the share of the limits that a plan leaves to the feedback that tracks it."""
 
-TOLERANCE = 5e-3
-"""Default of how far rounded corners may pass from a pose [m]."""
+TOLERANCE = 5e-3  # default of how far rounded corners may pass from a pose [m]
 
 ARC_STEP = float(np.radians(5.0))
 """Largest distance of the points of an arc that a spline goes through [rad]."""

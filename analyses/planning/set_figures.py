@@ -27,26 +27,16 @@ from cdpr_drake.workspaces.moving_clearances import moving_clearances
 if TYPE_CHECKING:
     from cdpr_drake.analyses.planning.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan
 
-POINTS = 400
-"""Points of curves."""
-
-VIEWS = ((0, 1), (0, 2), (1, 2))
-"""Coordinates across and up of the three views."""
-
-CIRCLE = 24
-"""Corners of a round outline."""
+POINTS = 400  # points of curves
+VIEWS = ((0, 1), (0, 2), (1, 2))  # coordinates across and up of the three views
+CIRCLE = 24  # corners of a round outline
 
 PLACES, INSTANTS = 90, 160
 """Places of the way and instants at which obstacles that move are looked for."""
 
-REPLAY_RATE = 30.0
-"""Frames of the replay a second [Hz]."""
-
-AFTER = 1.0
-"""How long what moves is shown after the platform has arrived [s]."""
-
-RESTS, MOVES = (0.55, 0.55, 0.55, 1.0), (0.72, 0.55, 0.38, 1.0)
-"""Colours of obstacles."""
+REPLAY_RATE = 30.0  # frames of the replay a second [Hz]
+AFTER = 1.0  # how long what moves is shown after the platform has arrived [s]
+RESTS, MOVES = (0.55, 0.55, 0.55, 1.0), (0.72, 0.55, 0.38, 1.0)  # colours of obstacles
 
 ENDS = (("start", DESIRED), ("goal", TARGET))
 
