@@ -90,22 +90,6 @@ def test_random_arcs_lie_on_their_circle_by_centre_and_by_radius(
             np.testing.assert_allclose(points[-1], end, atol=1e-8)
 
 
-@pytest.mark.parametrize(("plane", "start", "end", "center", "middle"), [
-    ("G17", "X10 Y0", "X0 Y-10", "I-10", [1, -1, 0]),
-    ("G18", "Z10 X0", "Z0 X-10", "K-10", [-1, 0, 1]),
-    ("G19", "Y10 Z0", "Y0 Z-10", "J-10", [0, 1, -1]),
-])  # fmt: skip
-def test_g2_is_clockwise_seen_from_the_tip_of_the_third_axis(
-    read, plane, start, end, center, middle
-):
-    """From (1, 0) round 0 a quarter clockwise to (0, -1)."""
-    path = read(f"{plane} G0 X0 Y0 Z0\nG0 {start}\nG2 {end} {center}\n")
-    first, last, arc = last_arc(path)
-    assert arc.angle == pytest.approx(-np.pi / 2)
-    halfway = arc.at(first, last, 0.5)[0]
-    np.testing.assert_allclose(halfway, 0.01 * np.sqrt(0.5) * np.array(middle), atol=ROUNDING)
-
-
 def test_whole_circles_and_helices(read):
     path = read(HEAD + "G3 I50 F600\nG2 X0 Y0 Z310 I0 J20\n")
     circle, helix = path.moves
