@@ -3,7 +3,6 @@ from .path_plan import PathMotion as PathMotion
 from .plan_tracking import track_plan as track_plan
 from .plans import Plan as Plan
 from .rest_to_rest import plan_rest_to_rest as plan_rest_to_rest
-from .robot_path_task import LimitSettings as LimitSettings
 from .robot_path_task import make_path as make_path
 from .robot_path_task import path_task as path_task
 from .robot_path_task import robot_limits as robot_limits

@@ -1,9 +1,10 @@
-"""What users ask of a motion whose path is free, and its program."""
+"""A motion of a robot whose path is free: its program, and where the solver starts."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -38,19 +39,13 @@ LEAST = ("time", "tension", "energy")
 """What a motion has least of: its time; the mean square of the tensions, in a given time; that
 integrated over a time that is free or given."""
 
-NEAREST = 0.1
-"""Least depth of points that stay in view, where nobody says [m]."""
-
-LONGEST = 60.0
-"""Longest time of a motion whose time is free [s]."""
-
-SHORTEST = 0.05
+NEAREST = 0.1  # default of the least depth of points that stay in view [m]
+SHORTEST, LONGEST = 0.05, 60.0  # times of a motion [s]
 
 GUESSED_SPEED = 0.2
 """Of Po, for a first guess of the time where the straight line cannot be followed [m/s]."""
 
-END_MISSED = 1e-6
-"""An end that misses a distance by less keeps it [m]: the solver is no more exact."""
+END_MISSED = 1e-6  # an end that misses a distance by less keeps it [m]: the solver is no more exact
 
 GUESS_WITHIN = 1e-3
 """By which the ends of a guess may be off [m, rad]: files have rounded numbers, and the solver
@@ -59,128 +54,65 @@ keeps the ends by itself."""
 GUESSES = (1.3, 2.5, 5.0)
 """Times from which a solver starts, over the least along the straight line, until it succeeds."""
 
-LOOKS = 80
-"""Poses of a way that are looked at."""
-
-DIRECTIONS = 8
-"""Directions across the straight line into which ways lead."""
-
-STEPS = 24
-"""Distances from the straight line that are tried in a direction, up to its length."""
+LOOKS = 80  # poses of a way that are looked at
+DIRECTIONS = 8  # directions across the straight line into which ways lead
+STEPS = 24  # distances from the straight line that are tried in a direction, up to its length
 
 SHARES = (0.0, 0.2, 0.5)
 """Of the straight line: where a way leaves it and, from the other end, comes back to it."""
 
-MOST_DETOURS = 4
-"""Ways that are given, each in a direction of its own."""
+MOST_DETOURS = 4  # ways that are given, each in a direction of its own
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FreeSettings:
-    """What is asked of a free motion.
-
-    Attributes:
-        start: X_WP at its start [m].
-        goal: X_WP at its end [m].
-        least: One of `LEAST`.
-        duration: Time from start to goal; None: free [s].
-        knots: Of the program.
-        clearance: Least distance of cables from each other, and of cables and platform from
-            obstacles; None: not asked for [m].
-        obstacles: What stands in the way; or boxes, rows of `cable_interference.box_row`, shape
-            (o, 15).
-        in_view: Points of W that a camera on the platform sees all along, shape (3, p); None: no.
-        camera: Name of the camera's mounting; None: the only one on the platform.
-        nearest: Least depth of these points in the camera [m].
-        guess: Where the solver starts, from start to goal; None: the straight line, or detours
-            where something stands in its way.
-    """
-
-    start: RigidTransform
-    goal: RigidTransform
-    least: str = "time"
-    duration: float | None = None
-    knots: int = KNOTS
-    clearance: float | None = None
-    obstacles: Obstacles | Array | None = None
-    in_view: Array | None = None
-    camera: str | None = None
-    nearest: float = NEAREST
-    guess: PosePath | TimedPath | None = None
-
-    def __post_init__(self) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            PlanningError: It is not accepted; names it.
-        """
-        if self.least not in LEAST:
-            raise PlanningError(f"least: found {self.least!r}; {accepted_names(self.least, LEAST)}")
-        if self.least == "time" and self.duration is not None:
-            raise PlanningError("duration: found one with the least time; accepted: none")
-        if self.least == "tension" and self.duration is None:
-            raise PlanningError(
-                "duration: found none with the least tension, which longer motions always have "
-                "less of; accepted: a time [s]"
-            )
-        if self.duration is not None and not SHORTEST <= self.duration <= LONGEST:
-            raise PlanningError(
-                f"duration: found {self.duration:g} s; accepted: {SHORTEST:g} to {LONGEST:g}"
-            )
-        if self.clearance is not None and not 0.0 <= self.clearance < np.inf:
-            raise PlanningError(f"clearance: found {self.clearance:g} m; accepted: at least 0")
-        if self.obstacles is not None and self.clearance is None:
-            raise PlanningError("clearance: found none for the obstacles; accepted: one [m]")
-        if not (np.isfinite(self.nearest) and self.nearest > 0.0):
-            raise PlanningError(f"nearest: found {self.nearest:g} m; accepted: above 0")
-
-    def solids(self) -> Obstacles:
-        """What stands in the way."""
-        if isinstance(self.obstacles, Obstacles):
-            return self.obstacles
-        return Obstacles() if self.obstacles is None else Obstacles(np.asarray(self.obstacles))
+Guess: TypeAlias = PosePath | TimedPath | None
+"""Where the solver starts; None: the straight line."""
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera on the platform as a plan takes it.
+    """Points of W that a camera on the platform sees all along.
 
     Attributes:
-        X_PC: Its pose [m].
+        X_PC: Pose of the camera [m].
         slopes: Tangents of half of its view's angles along x and y of C.
+        points: Shape (3, p) [m].
+        nearest: Least depth of these in the camera [m].
     """
 
     X_PC: RigidTransform
     slopes: tuple[float, float]
+    points: Array
+    nearest: float = NEAREST
 
 
-def camera_view(robot: Robot, name: str | None) -> View:
-    """The camera of a mounting on the platform.
+def camera_view(robot: Robot, name: str | None, points: Array, nearest: float = NEAREST) -> View:
+    """The view of the camera of a mounting on the platform; default: the only one.
 
     Raises:
-        PlanningError: There is none of that name, or none or several and no name.
+        PlanningError: There is none of that name, or none or several and no name, or the least
+            depth is not accepted.
     """
-    mounts = [mount for mount in robot.cameras if mount.parent == "platform"]
-    names = [mount.name for mount in mounts]
+    if not (np.isfinite(nearest) and nearest > 0.0):
+        raise PlanningError(f"nearest: found {nearest:g} m; accepted: above 0")
+    mounts = {mount.name: mount for mount in robot.cameras if mount.parent == "platform"}
     if name is None and len(mounts) != 1:
         raise PlanningError(
             f"camera: found {len(mounts)} on the platform of {robot.name} and no name; accepted: "
-            f"{'the name of one of ' + ', '.join(names) if names else 'a robot that has one'}"
+            f"{'the name of one of ' + ', '.join(mounts) if mounts else 'a robot that has one'}"
         )
-    if name is not None and name not in names:
+    if name is not None and name not in mounts:
         raise PlanningError(
-            f"camera: found {name!r}; accepted for {robot.name}: {', '.join(names) or 'none'}"
+            f"camera: found {name!r}; accepted for {robot.name}: {', '.join(mounts) or 'none'}"
         )
-    mount = mounts[0] if name is None else next(mount for mount in mounts if mount.name == name)
-    return View(mount.pose.transform(), load_camera(mount.model).view_slopes())
+    mount = mounts[next(iter(mounts)) if name is None else name]
+    return View(mount.pose.transform(), load_camera(mount.model).view_slopes(), points, nearest)
 
 
 def solve_free_motion(
-    robot: Robot,
-    task: PathTask,
-    settings: FreeSettings,
-    say: Callable[[str], None] = lambda words: None,
-) -> FreePathSolution:
+    robot: Robot, task: PathTask, start: RigidTransform, goal: RigidTransform, *,
+    least: str = "time", duration: float | None = None, knots: int = KNOTS,
+    clearance: float | None = None, obstacles: Obstacles | None = None, view: View | None = None,
+    guess: Guess = None, say: Callable[[str], None] = lambda words: None,
+) -> FreePathSolution:  # fmt: skip
     """Plans a motion from rest to rest whose path is free.
 
     Po stays in the robot's frame; limits of tensions, winches and the speed of Po are kept at the
@@ -193,27 +125,53 @@ def solve_free_motion(
     Args:
         robot: The robot.
         task: The robot and its limits.
-        settings: What is asked.
+        start: X_WP at the start [m].
+        goal: X_WP at the end [m].
+        least: One of `LEAST`.
+        duration: Time from start to goal; None: free [s].
+        knots: Of the program.
+        clearance: Least distance of cables from each other, and of cables and platform from
+            obstacles; None: not asked for [m].
+        obstacles: What stands in the way.
+        view: What a camera on the platform sees all along.
+        guess: Where the solver starts, from start to goal; None: the straight line, or detours
+            where something stands in its way.
         say: Told what is done now.
 
     Raises:
         PlanningError: A number is not accepted, the platform cannot rest at an end, or no motion
             was found; says where, and which cable.
     """
-    for where, X_WP in (("from", settings.start), ("to", settings.goal)):
+    _check_numbers(least, duration, clearance, obstacles)
+    for where, X_WP in (("from", start), ("to", goal)):
         try:
             check_pose(robot, X_WP)
         except TensionProblemError as problem:
             raise PlanningError(f"{where}: {problem}") from problem
         check_held(task, X_WP, where)
-    if max(pose_error(settings.start, settings.goal)) < 1e-9:
+    if max(pose_error(start, goal)) < 1e-9:
         raise PlanningError("to: found the pose of the start; accepted: another one")
-    guesses = _guesses(robot, task, settings)
+
+    def places(coordinates: Coordinates) -> list[PoseConstraint]:
+        return place_constraints(robot, task, coordinates, clearance, obstacles, view)
+
+    blocked = None if clearance is None or obstacles is None else places(BodyState())
+    guesses = _guesses(task, length_scale(robot), (start, goal), duration, guess, blocked)
+    bounds = (SHORTEST, LONGEST) if duration is None else (duration, duration)
     solution = None
     for number, (path, time) in enumerate(guesses, 1):
         say(f"Planning for {robot.name}: start {number} of {len(guesses)}")
-        bounds = (SHORTEST, LONGEST) if settings.duration is None else (settings.duration,) * 2
-        program = _program(robot, task, settings, bounds)
+        program = FreePathProgram(task, start, goal, knots, bounds)
+        program.AddCableSpeedLimits()
+        program.AddWinchLimits()
+        if least == "time":
+            program.AddLeastTime()
+        elif least == "tension":
+            program.AddTensionCost()
+        else:
+            program.AddEnergyCost()
+        for constraint in places(program.pose_coordinates):
+            program.Add(constraint)
         candidate = program.Solve(float(np.clip(time, SHORTEST, LONGEST)), path)
         if solution is None or solution.trajectory is None or candidate.success:
             solution = candidate
@@ -224,54 +182,96 @@ def solve_free_motion(
     return solution
 
 
+def _check_numbers(
+    least: str, duration: float | None, clearance: float | None, obstacles: Obstacles | None
+) -> None:
+    if least not in LEAST:
+        raise PlanningError(f"least: found {least!r}; {accepted_names(least, LEAST)}")
+    if least == "time" and duration is not None:
+        raise PlanningError("duration: found one with the least time; accepted: none")
+    if least == "tension" and duration is None:
+        raise PlanningError(
+            "duration: found none with the least tension, which longer motions always have "
+            "less of; accepted: a time [s]"
+        )
+    if duration is not None and not SHORTEST <= duration <= LONGEST:
+        raise PlanningError(
+            f"duration: found {duration:g} s; accepted: {SHORTEST:g} to {LONGEST:g}"
+        )
+    if clearance is not None and not 0.0 <= clearance < np.inf:
+        raise PlanningError(f"clearance: found {clearance:g} m; accepted: at least 0")
+    if obstacles is not None and clearance is None:
+        raise PlanningError("clearance: found none for the obstacles; accepted: one [m]")
+
+
+def place_constraints(
+    robot: Robot, task: PathTask, coordinates: Coordinates, clearance: float | None,
+    obstacles: Obstacles | None, view: View | None,
+) -> list[PoseConstraint]:  # fmt: skip
+    """What is asked of poses alone: the frame, cables apart, obstacles, the view."""
+    cables, names = task.cables, [task.name(i) for i in range(task.cables.count)]
+    constraints: list[PoseConstraint] = []
+    if not robot.frame.assumed:
+        constraints.append(PlaceWithin(coordinates, *robot.frame.bounds()))
+    if clearance is not None:
+        radius = 0.5 * float(np.max(robot.diameters()))
+        constraints.append(CableClearance(cables, coordinates, clearance + 2.0 * radius, names))
+        shapes = () if obstacles is None else obstacles.shapes()
+        if shapes:
+            bodies = [ConvexShape.box(box_row(robot.box_center(), robot.platform.size))]
+            constraints.append(
+                ObstacleClearance(
+                    cables, coordinates, shapes, bodies, clearance + radius, clearance, names=names
+                )
+            )
+    if view is not None:
+        constraints.append(
+            TargetInView(coordinates, view.X_PC, view.slopes, view.points, view.nearest)
+        )
+    return constraints
+
+
 def _guesses(
-    robot: Robot, task: PathTask, settings: FreeSettings
-) -> list[tuple[PosePath | TimedPath | None, float]]:
-    """Where the solver starts, one after the other: a path, None the straight line, and a time.
+    task: PathTask, scale: float, ends: tuple[RigidTransform, RigidTransform],
+    duration: float | None, guess: Guess, places: list[PoseConstraint] | None,
+) -> list[tuple[Guess, float]]:  # fmt: skip
+    """Where the solver starts, one after the other, and in what time.
 
-    Raises:
-        PlanningError: The platform or a cable is in an obstacle at an end.
+    `places` is what poses have to keep where obstacles stand; None without obstacles.
     """
-    shares = GUESSES if settings.duration is None else (1.0,)
-    scale = length_scale(robot)
-    straight = straight_path([settings.start, settings.goal], scale)
+    shares = GUESSES if duration is None else (1.0,)
+    straight = straight_path(ends, scale)
 
-    def timed(path: PosePath | None, share: float) -> float:
-        if settings.duration is not None:
-            return settings.duration
-        return share * _time_along(task, path or straight)
+    def timed(path: PosePath) -> float:
+        return _time_along(task, path) if duration is None else duration
 
-    guess = settings.guess
     if isinstance(guess, TimedPath):  # which the solver starts from in its own time
-        _check_guess(settings, guess.pose(guess.start_time), guess.pose(guess.end_time))
+        _check_guess(ends, guess.pose(guess.start_time), guess.pose(guess.end_time))
         return [(guess, guess.end_time - guess.start_time)]
     if guess is not None:
-        _check_guess(settings, guess.pose(0.0), guess.pose(guess.length))
-        return [(guess, timed(guess, share)) for share in shares]
-    lines: list[tuple[PosePath | TimedPath | None, float]]
-    if settings.clearance is None or settings.obstacles is None:
-        least = timed(None, 1.0)
-        return [(None, share * least) for share in shares]
-    places = place_constraints(robot, task, settings, BodyState())
-    for where, X_WP in (("from", settings.start), ("to", settings.goal)):
-        _check_ends(places, X_WP, where)
+        _check_guess(ends, guess.pose(0.0), guess.pose(guess.length))
+        least = timed(guess)
+        return [(guess, share * least) for share in shares]
+    if places is not None:
+        for where, X_WP in zip(("from", "to"), ends, strict=True):
+            _check_clear(places, X_WP, where)
+    least = timed(straight)
+    lines: list[tuple[Guess, float]] = [(None, share * least) for share in shares]
+    if places is None:
+        return lines
     held = [*places, TensionFeasible(task, BodyState())]
-    lines = [(None, timed(None, share)) for share in shares]
     if is_free(held, straight):
         return lines
     moves = [row - 3 for row in task.dynamics.motions if row >= 3]
-    ways = detours(held, settings.start, settings.goal, scale, moves)
-    return [*((path, timed(path, shares[0])) for path in ways), *lines[:1]]
+    ways = detours(held, *ends, scale, moves)
+    return [*((path, shares[0] * timed(path)) for path in ways), *lines[:1]]
 
 
-def _check_guess(settings: FreeSettings, first: RigidTransform, last: RigidTransform) -> None:
-    """Refuses a guess between other poses.
-
-    Raises:
-        PlanningError: It is; says by how much.
-    """
-    for word, at, end in (("begins", first, settings.start), ("ends", last, settings.goal)):
-        way, angle = pose_error(at, end)
+def _check_guess(
+    ends: tuple[RigidTransform, RigidTransform], first: RigidTransform, last: RigidTransform
+) -> None:
+    for word, X_guess, X_end in zip(("begins", "ends"), (first, last), ends, strict=True):
+        way, angle = pose_error(X_guess, X_end)
         if max(way, angle) > GUESS_WITHIN:
             raise PlanningError(
                 f"guess: {word} {way:.4g} m and {np.degrees(angle):.4g} deg from there; "
@@ -279,12 +279,7 @@ def _check_guess(settings: FreeSettings, first: RigidTransform, last: RigidTrans
             )
 
 
-def _check_ends(places: list[PoseConstraint], X_WP: RigidTransform, where: str) -> None:
-    """Refuses an end that is too near to something.
-
-    Raises:
-        PlanningError: It is; names what.
-    """
+def _check_clear(places: list[PoseConstraint], X_WP: RigidTransform, where: str) -> None:
     for place in places:
         values, _ = place.evaluate(pose_row(X_WP)[np.newaxis])
         gaps = place.missed(values)[0]
@@ -292,57 +287,8 @@ def _check_ends(places: list[PoseConstraint], X_WP: RigidTransform, where: str) 
         if gaps[row] > END_MISSED:
             raise PlanningError(
                 f"{where}: found {values[0, row]:.4g} m of {place.rows[row]} "
-                f"({place.description}); "
-                f"accepted: at least {place.lower[row]:.4g} m"
+                f"({place.description}); accepted: at least {place.lower[row]:.4g} m"
             )
-
-
-def place_constraints(
-    robot: Robot, task: PathTask, settings: FreeSettings, coordinates: Coordinates
-) -> list[PoseConstraint]:
-    """What is asked of poses alone: the frame, cables apart, obstacles, the view."""
-    cables, names = task.cables, [task.name(i) for i in range(task.cables.count)]
-    constraints: list[PoseConstraint] = []
-    if not robot.frame.assumed:
-        constraints.append(PlaceWithin(coordinates, *robot.frame.bounds()))
-    if settings.clearance is not None:
-        radius = 0.5 * float(np.max(robot.diameters()))
-        apart = settings.clearance + 2.0 * radius
-        constraints.append(CableClearance(cables, coordinates, apart, names))
-        shapes = settings.solids().shapes()
-        if shapes:
-            bodies = [ConvexShape.box(box_row(robot.box_center(), robot.platform.size))]
-            lines = settings.clearance + radius
-            constraints.append(
-                ObstacleClearance(
-                    cables, coordinates, shapes, bodies, lines, settings.clearance, names=names
-                )
-            )
-    if settings.in_view is not None:
-        view = camera_view(robot, settings.camera)
-        constraints.append(
-            TargetInView(coordinates, view.X_PC, view.slopes, settings.in_view, settings.nearest)
-        )
-    return constraints
-
-
-def _program(
-    robot: Robot, task: PathTask, settings: FreeSettings, bounds: tuple[float, ...]
-) -> FreePathProgram:
-    program = FreePathProgram(
-        task, settings.start, settings.goal, settings.knots, (bounds[0], bounds[1])
-    )
-    program.AddCableSpeedLimits()
-    program.AddWinchLimits()
-    if settings.least == "time":
-        program.AddLeastTime()
-    elif settings.least == "tension":
-        program.AddTensionCost()
-    else:
-        program.AddEnergyCost()
-    for constraint in place_constraints(robot, task, settings, program.pose_coordinates):
-        program.Add(constraint)
-    return program
 
 
 def _time_along(task: PathTask, path: PosePath) -> float:
@@ -360,12 +306,9 @@ def is_free(constraints: Sequence[PoseConstraint], path: PosePath) -> bool:
 
 
 def detours(
-    constraints: Sequence[PoseConstraint],
-    start: RigidTransform,
-    goal: RigidTransform,
-    length_scale: float,
-    moves: Sequence[int] = (0, 1, 2),
-) -> list[PosePath]:
+    constraints: Sequence[PoseConstraint], start: RigidTransform, goal: RigidTransform,
+    length_scale: float, moves: Sequence[int] = (0, 1, 2),
+) -> list[PosePath]:  # fmt: skip
     """Ways of three or four straight lines that keep constraints, the shortest first.
 
     They leave the straight line across, go along it, and come back; of each direction the shortest
@@ -386,11 +329,10 @@ def detours(
         for share in SHARES:
             for step in range(1, STEPS + 1):
                 off = across * (length * step / STEPS)
-                corners = [start]
                 first = RigidTransform(start.rotation(), start.translation() + share * way + off)
                 last = RigidTransform(goal.rotation(), goal.translation() - share * way + off)
-                corners += [first] if share == 0.5 else [first, last]
-                path = straight_path([*corners, goal], length_scale)
+                corners = [first] if share == 0.5 else [first, last]
+                path = straight_path([start, *corners, goal], length_scale)
                 if is_free(constraints, path):
                     ways.append(path)
                     break

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import dataclass, field
 from math import atan2, hypot, inf, isfinite, isnan, nan, pi, sqrt
 from pathlib import Path
 
@@ -24,14 +23,12 @@ import numpy as np
 from cdpr_drake.errors import DataFileError
 from cdpr_drake.trajectories.curved_path import Arc, Move
 
-AXES = "XYZABC"
-"""Words of coordinates: lengths in the file's unit, then angles [deg]."""
+AXES = "XYZABC"  # words of coordinates: lengths in the file's unit, then angles [deg]
 
 PLANES = {17.0: (0, 1, 2), 18.0: (2, 0, 1), 19.0: (1, 2, 0)}
 """First, second and third axis of the planes of arcs, right-handed."""
 
-OFFSETS = "IJK"
-"""Words of an arc's centre along x, y, z."""
+OFFSETS = "IJK"  # words of an arc's centre along x, y, z
 
 IDLE = {
     4.0: "dwell", 10.0: "retraction", 11.0: "retraction undone", 15.0: "polar coordinates off",
@@ -54,8 +51,7 @@ M_CODES = {
 }  # fmt: skip
 """M codes by name, where many write the same; all are left out."""
 
-END = {2.0, 30.0}
-"""M codes after which nothing is read."""
+END = {2.0, 30.0}  # M codes after which nothing is read
 
 SHARED = 10.0
 """M codes from here on, but M30, own the other words of their line, as printers write them."""
@@ -66,15 +62,13 @@ OTHER = {
 }  # fmt: skip
 """Letters that move no platform."""
 
-PARAMETERS = "PQHDL"
-"""Letters that belong to a code that is left out."""
+PARAMETERS = "PQHDL"  # letters that belong to a code that is left out
 
 RADII = {1e-3: 2e-6, 0.0254: 5.08e-6}
 """By how much the distances of an arc's start and end from its centre may differ: 0.002 mm, or
 0.0002 inch (NIST IR 6556, 3.5.3.2), by the unit [m]."""
 
-SAME = 1e-9
-"""Points of an arc that are closer are one: a whole circle [m]."""
+SAME = 1e-9  # points of an arc that are closer are one: a whole circle [m]
 
 _WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _COMMENT = re.compile(r"\([^)]*\)|;.*$")
@@ -82,21 +76,6 @@ _CHECKSUM = re.compile(r"\*\s*\d+\s*$")
 _MESSAGE = re.compile(r"^(?:N\s*\d+\s*)?M\s*(117|118|23|28)\b.*$")
 
 Place = list[float]
-
-
-@dataclass
-class GCode:
-    """What a file says.
-
-    Attributes:
-        places: x, y, z [m], phi, theta, psi [deg], one after the other.
-        moves: How it goes from each to the next.
-        remarks: What was left out, a line each.
-    """
-
-    places: list[Place] = field(default_factory=list)
-    moves: list[Move] = field(default_factory=list)
-    remarks: tuple[str, ...] = ()
 
 
 def parse_g_code(path: Path, lines: list[str], height: float | None) -> GCode:
@@ -110,39 +89,49 @@ def parse_g_code(path: Path, lines: list[str], height: float | None) -> GCode:
     Raises:
         DataFileError: A line is not accepted; names it.
     """
-    machine = _Machine(path, height)
-    for number, line in enumerate(lines, 1):
-        machine.number = number
-        if machine.ended:
-            machine.count_rest(line)
-        else:
-            machine.read(line)
-    machine.finish()
-    return GCode(machine.places, machine.moves, machine.remarks())
+    code = GCode(path, height)
+    for code.number, line in enumerate(lines, 1):
+        code.read(line)
+    if not code.places and code.early:
+        raise DataFileError(code.early)
+    return code
 
 
-class _Machine:
-    """What lines have set so far, and the path that came of it."""
+class GCode:
+    """What lines of G-code have set so far, and the path that came of it.
+
+    Attributes:
+        places: x, y, z [m], phi, theta, psi [deg], one after the other.
+        moves: How it goes from each to the next.
+    """
 
     def __init__(self, path: Path, height: float | None) -> None:
+        """For lines of a file; as `parse_g_code`."""
         self.path, self.number = path, 0
         self.unit, self.absolute, self.centers_absolute = 1e-3, True, False
         self.motion: float | None = None
         self.plane, self.feed, self.ended = 17.0, inf, False
         unknown = nan if height is None else height
         self.place: Place = [nan, nan, unknown, 0.0, 0.0, 0.0]
-        self.offset, self.kept = [0.0] * 6, [0.0] * 6
+        self.offset, self.suspended = [0.0] * 6, [0.0] * 6
         self.places: list[Place] = []
         self.moves: list[Move] = []
         self.left_out: Counter[str] = Counter()
         self.early, self.lost = "", False
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What was left out, once each, with how often."""
+        return tuple(f"{words} left out: {count}" for words, count in sorted(self.left_out.items()))
+
     def refuse(self, found: str, accepted: str) -> DataFileError:
+        """A refusal of the present line."""
         return DataFileError(
             f"{self.path}: line {self.number}: found {found}; accepted: {accepted}"
         )
 
     def refuse_word(self, letter: str, value: float) -> DataFileError:
+        """A refusal of a word of the present line."""
         return self.refuse(
             f"the word {letter}{value:g}",
             "G0 to G3, X, Y, Z, A, B, C, I, J, K, R, F, N, and M, S, T, E, which are left out",
@@ -151,6 +140,10 @@ class _Machine:
     def read(self, line: str) -> None:
         """One line, in the order of NIST IR 6556, 3.8: feed, modes, offsets, motion, end."""
         rest = _COMMENT.sub("", line).strip().upper()
+        if self.ended:
+            if rest.strip(" %\t"):
+                self.left_out["lines after the end of the program"] += 1
+            return
         if rest.startswith("/"):
             self.left_out["/ (block delete, taken as off)"] += 1
             rest = rest[1:].strip()
@@ -159,44 +152,30 @@ class _Machine:
         if (text := _MESSAGE.match(rest)) is not None:
             self._leave_out_m(float(text[1]))
             return
-        codes, given = self._words(rest)
-        if "F" in given:
-            self._set_feed(given.pop("F"))
+        codes, words = self._words(rest)
+        if "F" in words:
+            self._set_feed(words.pop("F"))
         m_codes = [value for letter, value in codes if letter == "M"]
         g_codes = [value for letter, value in codes if letter == "G"]
         if any(code >= SHARED and code not in END for code in m_codes) and not g_codes:
-            given = {}
-        self._set_modes(g_codes, given)
-        for letter in [letter for letter in given if letter in OTHER]:
-            value = given.pop(letter)
+            words = {}
+        self._set_modes(g_codes, words)
+        for letter in [letter for letter in words if letter in OTHER]:
+            value = words.pop(letter)
             if letter in PARAMETERS and not m_codes:
                 raise self.refuse_word(letter, value)
             self.left_out[f"{letter} words ({OTHER[letter]})"] += 1
-        if any(letter in AXES or letter in "IJKR" for letter in given):
-            self._go(given)
+        if any(letter in AXES or letter in "IJKR" for letter in words):
+            self._go(words)
         for code in m_codes:
             self._leave_out_m(code)
             self.ended = self.ended or code in END
-
-    def count_rest(self, line: str) -> None:
-        """A line behind the end of the program."""
-        if _COMMENT.sub("", line).strip(" %\t"):
-            self.left_out["lines after the end of the program"] += 1
-
-    def finish(self) -> None:
-        """Makes sure that there is a path."""
-        if not self.places and self.early:
-            raise DataFileError(self.early)
-
-    def remarks(self) -> tuple[str, ...]:
-        """What was left out, once each, with how often."""
-        return tuple(f"{words} left out: {count}" for words, count in sorted(self.left_out.items()))
 
     def _words(self, rest: str) -> tuple[list[tuple[str, float]], dict[str, float]]:
         """Codes G and M of a line, and its other words but N, each letter once."""
         rest = _CHECKSUM.sub("", rest)
         codes: list[tuple[str, float]] = []
-        given: dict[str, float] = {}
+        words: dict[str, float] = {}
         while rest:
             match = _WORD.match(rest)
             if match is None:
@@ -208,20 +187,20 @@ class _Machine:
             rest = rest[match.end() :]
             if letter in "GM":
                 codes.append((letter, value))
-            elif letter in given:
+            elif letter in words:
                 raise self.refuse(f"{letter} twice", "once")
             elif letter in AXES or letter in OTHER or letter in "FIJKR":
-                given[letter] = value
+                words[letter] = value
             elif letter != "N":
                 raise self.refuse_word(letter, value)
-        return codes, given
+        return codes, words
 
     def _set_feed(self, value: float) -> None:
         if not value > 0.0:
             raise self.refuse(f"F{value:g}", "a feed above 0")
         self.feed = value * self.unit / 60.0  # in the unit before this line, as 3.8 says
 
-    def _set_modes(self, codes: list[float], given: dict[str, float]) -> None:
+    def _set_modes(self, codes: list[float], words: dict[str, float]) -> None:
         motions = [code for code in codes if code in (0.0, 1.0, 2.0, 3.0)]
         if len(motions) > 1:
             raise self.refuse(f"G{motions[0]:g} and G{motions[1]:g}", "one motion a line")
@@ -238,11 +217,11 @@ class _Machine:
                 self.motion = code
         for code in codes:
             if code in (28.0, 30.0):
-                self._go_home(code, given)
+                self._go_home(code, words)
             elif code in (92.0, 92.1, 92.2, 92.3):
-                self._set_offset(code, given)
+                self._set_offset(code, words)
             elif code in IDLE:
-                self._idle(code, given)
+                self._idle(code, words)
             elif code not in (*motions, *PLANES, 20.0, 21.0, 90.0, 91.0, 90.1, 91.1):
                 raise self.refuse(
                     f"G{code:g}",
@@ -250,49 +229,49 @@ class _Machine:
                     "coordinates G90, G91, G90.1, G91.1, G92, and what moves no platform",
                 )
 
-    def _idle(self, code: float, given: dict[str, float]) -> None:
+    def _idle(self, code: float, words: dict[str, float]) -> None:
         """A code that is left out, with the words that belong to it."""
-        if code in (10.0, 11.0) and "L" in given:
-            raise self.refuse(f"G{code:g} L{given['L']:g}", "no tables of coordinate systems")
-        for letter in [letter for letter in given if letter in "PQSLHD" or code == 29.0]:
-            del given[letter]
+        if code in (10.0, 11.0) and "L" in words:
+            raise self.refuse(f"G{code:g} L{words['L']:g}", "no tables of coordinate systems")
+        for letter in [letter for letter in words if letter in "PQSLHD" or code == 29.0]:
+            del words[letter]
         self.left_out[f"G{code:g} ({IDLE[code]})"] += 1
 
-    def _go_home(self, code: float, given: dict[str, float]) -> None:
+    def _go_home(self, code: float, words: dict[str, float]) -> None:
         """Where a machine's home is, no file says: the axes are not known afterwards."""
         self.left_out[f"G{code:g} (home)"] += 1
-        named = [k for k in range(6) if AXES[k] in given]
+        named = [k for k in range(6) if AXES[k] in words]
         for k in named or range(3):
             self.place[k] = nan
-        given.clear()
+        words.clear()
         self.lost = bool(self.places)
 
-    def _set_offset(self, code: float, given: dict[str, float]) -> None:
+    def _set_offset(self, code: float, words: dict[str, float]) -> None:
         """G92: the place where Po is gets these coordinates; .1 and .2: no longer, .3: again."""
         if code == 92.0:
             for k, letter in enumerate(AXES):
-                if letter not in given:
+                if letter not in words:
                     continue
-                value = given.pop(letter) * (self.unit if k < 3 else 1.0)
+                value = words.pop(letter) * (self.unit if k < 3 else 1.0)
                 if isnan(self.place[k]):
                     self.place[k] = value + self.offset[k]
                 else:
                     self.offset[k] = self.place[k] - value
-            if given.pop("E", None) is not None:
+            if words.pop("E", None) is not None:
                 self.left_out["E words (extruder)"] += 1
             return
         if code == 92.2:
-            self.kept = list(self.offset)
+            self.suspended = list(self.offset)
         elif code == 92.1:
-            self.kept = [0.0] * 6
-        self.offset = list(self.kept) if code == 92.3 else [0.0] * 6
+            self.suspended = [0.0] * 6
+        self.offset = list(self.suspended) if code == 92.3 else [0.0] * 6
 
-    def _go(self, given: dict[str, float]) -> None:
+    def _go(self, words: dict[str, float]) -> None:
         """A motion in the mode that holds."""
         if self.motion is None:
             raise self.refuse("coordinates before any G0 or G1", "after one")
         target = list(self.place)
-        for letter, value in given.items():
+        for letter, value in words.items():
             if letter not in AXES:
                 continue
             k = AXES.index(letter)
@@ -306,8 +285,8 @@ class _Machine:
             raise self.refuse("a motion after G28 or G30", "these before or after all motions")
         move = Move(speed=inf if self.motion == 0.0 else self.feed)
         if self.motion in (2.0, 3.0):
-            move = Move(self._arc(target, given), self.feed)
-        elif stray := [letter for letter in "IJKR" if letter in given]:
+            move = Move(self._arc(target, words), self.feed)
+        elif stray := [letter for letter in "IJKR" if letter in words]:
             raise self.refuse(f"{stray[0]} with G{self.motion:g}", "with G2 and G3")
         if not self.places:
             self.places.append(target)
@@ -318,19 +297,17 @@ class _Machine:
 
     def _before_the_path(self, target: Place, unknown: str) -> None:
         """A motion with coordinates that nobody knows yet is not on the path."""
-        accepted = "a first move to X, Y and Z"
-        if self.places or self.motion in (2.0, 3.0):
-            raise DataFileError(
-                f"{self.path}: line {self.number}: {unknown} is not known there; accepted: "
-                f"{accepted}"
-            )
-        self.early = self.early or (
-            f"{self.path}: line {self.number}: {unknown} is not known there; accepted: {accepted}"
+        refusal = (
+            f"{self.path}: line {self.number}: {unknown} is not known there; accepted: a first "
+            "move to X, Y and Z"
         )
+        if self.places or self.motion in (2.0, 3.0):
+            raise DataFileError(refusal)
+        self.early = self.early or refusal
         self.left_out["motions before X, Y and Z are known"] += 1
         self.place = target
 
-    def _arc(self, target: Place, given: dict[str, float]) -> Arc:
+    def _arc(self, target: Place, words: dict[str, float]) -> Arc:
         """Centre, axis and angle of G2 or G3 to a target."""
         if not self.places:
             raise self.refuse(f"G{self.motion:g} as the first motion", "G0 or G1 to its start")
@@ -339,17 +316,17 @@ class _Machine:
         a, b = self.place[first], self.place[second]
         da, db = target[first] - a, target[second] - b
         chord = hypot(da, db)
-        offsets = [k for k in range(3) if OFFSETS[k] in given]
+        offsets = [k for k in range(3) if OFFSETS[k] in words]
         if third in offsets:
             raise self.refuse(f"{OFFSETS[third]} in the plane G{self.plane:g}", "a centre in it")
-        if ("R" in given) == bool(offsets):
+        if ("R" in words) == bool(offsets):
             raise self.refuse(
                 "both R and a centre" if offsets else "neither R nor a centre", "one of them"
             )
-        if "R" in given:
-            u, v = self._middle(given["R"] * self.unit, chord, (da, db), clockwise)
+        if "R" in words:
+            u, v = self._middle(words["R"] * self.unit, chord, (da, db), clockwise)
         else:
-            u, v = (self._offset(given, k) for k in (first, second))
+            u, v = (self._offset(words, k) for k in (first, second))
             self._check_radii(hypot(u, v), hypot(da - u, db - v))
         turn = atan2(db - v, da - u) - atan2(-v, -u)
         if chord < SAME:
@@ -363,11 +340,11 @@ class _Machine:
         axis[third] = 1.0
         return Arc(center, axis, float(turn))
 
-    def _offset(self, given: dict[str, float], k: int) -> float:
+    def _offset(self, words: dict[str, float], k: int) -> float:
         """The centre along an axis, from the start [m]."""
-        if OFFSETS[k] not in given:
+        if OFFSETS[k] not in words:
             return 0.0
-        value = given[OFFSETS[k]] * self.unit
+        value = words[OFFSETS[k]] * self.unit
         return value + self.offset[k] - self.place[k] if self.centers_absolute else value
 
     def _middle(

@@ -36,20 +36,11 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings
 from cdpr_drake.trajectories.pose_path import straight_path
 
-PERIOD = 1e-3
-"""Of the commands [s]."""
-
-STEP = 1e-4
-"""Of the integration [s]."""
-
-LOOK = 2e-3
-"""Between looks at the platform [s]."""
-
-KNOTS = 21
-"""Poses along the way at which the lengths are found."""
-
-SPEED_LOOKS = 400
-"""Instants at which the speeds of a command are looked at."""
+PERIOD = 1e-3  # of the commands [s]
+STEP = 1e-4  # of the integration [s]
+LOOK = 2e-3  # between looks at the platform [s]
+KNOTS = 21  # poses along the way at which the lengths are found
+SPEED_LOOKS = 400  # instants at which the speeds of a command are looked at
 
 SLOW = 8.0
 """Vibrations that are faster than so many a motion are left alone: a smooth law of time does not
@@ -117,15 +108,10 @@ class Swing:
 
 
 def plan_shaped_rest(
-    robot: Robot,
-    start: RigidTransform,
-    goal: RigidTransform,
-    duration: float,
-    kind: str | None = "ZVD",
-    *,
-    cables: CableSettings | None = None,
+    robot: Robot, start: RigidTransform, goal: RigidTransform, duration: float,
+    kind: str | None = "ZVD", *, cables: CableSettings | None = None,
     bounds: tuple[float, float] | None = None,
-) -> ShapedRest:
+) -> ShapedRest:  # fmt: skip
     """Plans a motion that leaves little swing.
 
     Args:
@@ -156,8 +142,7 @@ def plan_shaped_rest(
     model, (push, turn) = settings.model_of(robot), DampingSettings().of(robot)
     D = np.diag([turn] * 3 + [push] * 3)
     poses = straight_path([start, goal], 1.0)
-    rests, frequencies, shaper = [], [], NO_SHAPER
-    dampings = []
+    rests, frequencies, dampings, shaper = [], [], [], NO_SHAPER
     for s in (0.0, 0.5, 1.0):
         rest = equilibrium_near(
             real, model, platform, l0(s), poses.pose(s * poses.length), soften=s == 0.0
@@ -216,17 +201,12 @@ def simulate_swing(
             begins at rest on these, and is looked at from where it rests on them in the end.
     """
     robot = motion.robot
-    end = motion.end_time + watch
-    settings, rest, goal = motion.cables, motion.start, motion.goal
-    if cables is not None:
-        settings = cables
-        rest, goal = rests_on(motion, cables)
+    end, settings = motion.end_time + watch, cables or motion.cables
+    rest, goal = (motion.start, motion.goal) if cables is None else rests_on(motion, cables)
     block = CompiledCableRobot(
-        robot,
-        CableRobotSettings(cables=settings),
+        robot, CableRobotSettings(cables=settings), command_period=HELD,
         rule=StepRule(method="runge_kutta3", max_step=STEP),
-        command_period=HELD,
-    )
+    )  # fmt: skip
     builder = DiagramBuilder()
     builder.AddNamedSystem("robot", block)
     source = builder.AddNamedSystem("velocities", TrajectorySource(_velocities(motion, end)))
@@ -273,11 +253,9 @@ def _velocities(motion: ShapedRest, end: float) -> PiecewisePolynomial:
 
 
 def _lengths(
-    robot: Robot,
-    settings: CableSettings,
-    ends: tuple[RigidTransform, RigidTransform],
+    robot: Robot, settings: CableSettings, ends: tuple[RigidTransform, RigidTransform],
     bounds: tuple[float, float],
-) -> CubicSpline:
+) -> CubicSpline:  # fmt: skip
     """Unstrained lengths by s from 0 to 1."""
     cables, platform = settings.cable_set(robot), rigid_platform(robot)
     model = settings.model_of(robot)
@@ -285,7 +263,7 @@ def _lengths(
     if cables.count < platform.motion.freedom:  # nothing to choose: they hang as long as they are
         l0 = np.array([cable_paths(X, cables).lengths for X in ends])
         return CubicSpline([0.0, 0.5, 1.0], np.array([l0[0], 0.5 * (l0[0] + l0[1]), l0[1]]))
-    knots, found = np.linspace(0.0, 1.0, KNOTS), []
+    knots, lengths = np.linspace(0.0, 1.0, KNOTS), []
     for s in knots:
         X_WP = path.pose(s * path.length)
         wrench = platform.weight_wrench(X_WP)
@@ -295,8 +273,8 @@ def _lengths(
                 f"{robot.name} cannot hold the platform at {X_WP.translation().round(4)} m: no "
                 f"tensions within {bounds[0]:g} to {bounds[1]:g} N do"
             )
-        found.append(held.unstrained_lengths)
-    return CubicSpline(knots, np.array(found))
+        lengths.append(held.unstrained_lengths)
+    return CubicSpline(knots, np.array(lengths))
 
 
 def _shaper(kind: str, frequencies: Array, dampings: Array, duration: float) -> Shaper:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +20,7 @@ from cdpr_drake.trajectories.curved_path import STRAIGHT, Move
 COLUMNS = ("x", "y", "z", "phi", "theta", "psi")
 """Of a table: position in W [m], and angles, R = Rx(phi) Ry(theta) Rz(psi) [deg]."""
 
-G_CODE = (".gcode", ".nc", ".ngc", ".tap")
-"""Endings of G-code."""
+G_CODE = (".gcode", ".nc", ".ngc", ".tap")  # endings of G-code
 
 
 @dataclass(frozen=True)
@@ -82,49 +81,49 @@ def read_path(path: Path, height: float | None = None) -> PathPoses:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as problem:
         raise DataFileError(f"{path}: cannot be read as text: {problem}") from problem
-    read = _read_table(path, lines) if ending == ".csv" else _read_g_code(path, lines, height)
-    if len(read.poses) < 2:
-        raise DataFileError(f"{path}: found {len(read.poses)} poses; accepted: at least 2")
-    return read
+    if ending == ".csv":
+        result = PathPoses([_pose(row) for row in _table_rows(path, lines)], path.name)
+    else:
+        code = parse_g_code(path, lines, height)
+        plain = all(move.arc is None and move.speed == STRAIGHT.speed for move in code.moves)
+        moves = () if plain else tuple(code.moves)
+        result = PathPoses([_pose(place) for place in code.places], path.name, code.remarks, moves)
+    if len(result.poses) < 2:
+        raise DataFileError(f"{path}: found {len(result.poses)} poses; accepted: at least 2")
+    return result
 
 
-def _read_table(path: Path, lines: list[str]) -> PathPoses:
+def _table_rows(path: Path, lines: list[str]) -> list[list[float]]:
     """Rows of `COLUMNS`, or of the first three; a head with these names may stand above them."""
-    poses: list[RigidTransform] = []
+    rows: list[list[float]] = []
     size = 0
-    for number, row in _rows(path, lines):
-        words = [word.strip() for word in row]
-        if not size and words[0].isidentifier():
-            names = tuple(word.lower() for word in words)
-            if names not in (COLUMNS[:3], COLUMNS):
-                raise DataFileError(
-                    f"{path}: line {number}: found the columns {', '.join(words)[:80]}; accepted: "
-                    f"{', '.join(COLUMNS[:3])} [m], or {', '.join(COLUMNS)} [m, deg]"
-                )
-            size = len(names)
-            continue
-        values = [_number(word) for word in words]
-        accepted = (size,) if size else (3, 6)
-        if len(values) not in accepted or not np.all(np.isfinite(values)):
-            raise DataFileError(
-                f"{path}: line {number}: found {','.join(words)[:80]!r}; accepted: "
-                f"{' or '.join(str(k) for k in accepted)} finite numbers, x,y,z [m] and "
-                "phi,theta,psi [deg]"
-            )
-        size = len(values)
-        poses.append(_pose(values))
-    return PathPoses(poses, path.name)
-
-
-def _rows(path: Path, lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """Number and words of the lines that say something."""
     reader = csv.reader(lines)
     try:
         for number, row in enumerate(reader, 1):
-            if any(word.strip() for word in row) and not row[0].lstrip().startswith("#"):
-                yield number, row
+            words = [word.strip() for word in row]
+            if not any(words) or words[0].startswith("#"):
+                continue
+            if not size and words[0].isidentifier():
+                size = len(words)
+                if tuple(map(str.lower, words)) not in (COLUMNS[:3], COLUMNS):
+                    raise DataFileError(
+                        f"{path}: line {number}: found the columns {', '.join(words)[:80]}; "
+                        f"accepted: {', '.join(COLUMNS[:3])} [m], or {', '.join(COLUMNS)} [m, deg]"
+                    )
+                continue
+            accepted = (size,) if size else (3, 6)
+            values = [_number(word) for word in words]
+            if len(values) not in accepted or not np.all(np.isfinite(values)):
+                raise DataFileError(
+                    f"{path}: line {number}: found {','.join(words)[:80]!r}; accepted: "
+                    f"{' or '.join(map(str, accepted))} finite numbers, x,y,z [m] and "
+                    "phi,theta,psi [deg]"
+                )
+            size = len(values)
+            rows.append(values)
     except csv.Error as problem:
         raise DataFileError(f"{path}: line {reader.line_num}: {problem}") from problem
+    return rows
 
 
 def _number(word: str) -> float:
@@ -134,13 +133,5 @@ def _number(word: str) -> float:
         return np.nan
 
 
-def _pose(values: list[float]) -> RigidTransform:
-    angles = np.radians(values[3:] or [0.0, 0.0, 0.0])
-    return pose_from_angles(np.array(values[:3]), angles)
-
-
-def _read_g_code(path: Path, lines: list[str], height: float | None) -> PathPoses:
-    code = parse_g_code(path, lines, height)
-    plain = all(move.arc is None and move.speed == STRAIGHT.speed for move in code.moves)
-    moves = () if plain else tuple(code.moves)
-    return PathPoses([_pose(place) for place in code.places], path.name, code.remarks, moves)
+def _pose(values: Sequence[float]) -> RigidTransform:
+    return pose_from_angles(np.array(values[:3]), np.radians(values[3:] or [0.0] * 3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,17 +31,17 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.planning.path_files import path_poses
-from cdpr_drake.analyses.planning.plans import REACHED, Plan, finished, reached_rows, titled
+from cdpr_drake.analyses.planning.plan_figures import reached_figure
+from cdpr_drake.analyses.planning.plans import Plan, finished
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
     RESERVE,
     TOLERANCE,
-    LimitSettings,
     make_path,
+    path_task,
     pose_in_degrees,
-    robot_task,
+    robot_limits,
 )
-from cdpr_drake.analyses.visualization.curves import draw_bars
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.visualization.figure_style import (
     COVERED_LINE,
@@ -58,6 +58,8 @@ from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.planning.resistance import CornerMargins, resisted_along, wrench_words
 
 TRACKING = "computed torque, which tracking needs"
+
+ALONG = "way s along the path [m], turns by the length scale"  # label of axes
 
 
 def _waypoints(word: str) -> list[Any]:
@@ -110,10 +112,6 @@ class PathMotion(Plan):
         """How well it resists each of the wrenches that it must, at its stations; None: none."""
         return resisted_along(self.task, self.motion) if len(self.task.resist) else None
 
-    def reached_share(self) -> float:
-        """Share of the instants at which a limit is reached."""
-        return float(np.mean(np.max(self.samples.uses, axis=1) >= REACHED))
-
     def details(self) -> dict[str, Any]:
         """Duration, path, and wrenches that are resisted."""
         plan = self.solution
@@ -122,26 +120,25 @@ class PathMotion(Plan):
             "path_length_m": plan.path.length,
             "stations": len(plan.trajectory.stations),
             "rests": len(plan.path.rests),
-            "planning_time_s": self.planning_time,
             **({} if self.resisted is None else {"resist": self._resist(self.resisted)}),
         }
 
     def _resist(self, margins: CornerMargins) -> dict[str, Any]:
-        samples, worst = self.samples, margins.worst
-        assert samples.resisted is not None
-        between = int(np.argmax(samples.resisted))
+        shares = self.samples.resisted
+        assert shares is not None
+        between = int(np.argmax(shares))
         corners = [
             {"wrench_n_m_n": corner.tolist(), "least_margin": float(margin), "at_s_m": float(s)}
             for corner, margin, s in zip(
                 margins.corners, margins.margins, margins.parameters, strict=True
             )
         ]
-        row = self.solution.path.points(margins.parameters[[worst]])[0]
+        row = self.solution.path.points(margins.parameters[[margins.worst]])[0]
         return {
             "corners": corners,
-            "worst": corners[worst] | {"pose": pose_words(row)},
-            "largest_share_between_stations": float(samples.resisted[between]),
-            "at_s_m": float(samples.parameters[between]),
+            "worst": corners[margins.worst] | {"pose": pose_words(row)},
+            "largest_share_between_stations": float(shares[between]),
+            "at_s_m": float(self.samples.parameters[between]),
         }
 
     def description(self) -> list[str]:
@@ -162,13 +159,58 @@ class PathMotion(Plan):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The phase plane first: speed along the path with its limits."""
-        figures: dict[str, Callable[[], Figure]] = {
-            "phase_plane": partial(phase_figure, self),
-            **super().figures(),
-        }
-        if self.resisted is not None:
-            figures["resistance"] = partial(resistance_figure, self)
-        return figures
+        figures = {"phase_plane": self._phase_figure, **super().figures()}
+        return figures | ({} if self.resisted is None else {"resistance": self._resistance_figure})
+
+    def _phase_figure(self) -> Figure:
+        """Speed along the path below the largest speeds, and which limits are reached where."""
+        solution, samples = self.solution, self.samples
+        stations, top = solution.trajectory.stations, np.sqrt(solution.largest)
+
+        def draw(axes: Any) -> None:
+            axes.plot(
+                stations, np.sqrt(solution.reachable[:, 1]),
+                label="largest from which the end can be reached",
+                **COVERED_LINE | {"color": DESIRED.color, "marker": ""},
+            )  # fmt: skip
+            axes.plot(stations, top, label="largest at this point by itself", **line_style(BOUND))
+            axes.plot(samples.parameters, samples.speeds, label="plan", **line_style(DISTANCE))
+            most = float(np.max(samples.speeds))
+            axes.set_ylim(0.0, min(float(np.nanmax(top, initial=most)), 2.5 * most) * 1.05)
+            axes.set(ylabel="ds/dt [m/s]")
+            axes.legend(loc="lower center")
+
+        title = self.titled("Speed along the path, and the limits that it reaches")
+        return reached_figure(title, self.robot, samples, samples.parameters, ALONG, 4.6, draw)
+
+    def _resistance_figure(self) -> Figure:
+        """What the motion leaves of tensions and torques, alone and under wrenches to resist."""
+        margins, samples = self.resisted, self.samples
+        assert margins is not None
+        assert samples.resisted is not None
+        s, k = samples.parameters, margins.worst
+        free = replace(self.task, resist=np.empty((0, 6)))
+        alone = sample_motion(free, self.motion, samples.times).uses[:, TENSION_USE]
+        mark: dict[str, Any] = {"color": "black", "linestyle": "none"}
+        figure = bare_figure((11.0, 4.6), self.titled("What is left under the wrenches to resist"))
+        with styled():
+            axes = figure.subplots()
+            axes.plot(s, 1.0 - alone, label="motion alone", **line_style(IDEAL))
+            label = f"with the worst of {len(margins.corners)} wrenches at each point"
+            axes.plot(s, 1.0 - samples.resisted, label=label, **line_style(DISTANCE))
+            axes.plot(
+                margins.parameters, margins.margins, marker="o", markersize=4.0,
+                markerfacecolor="none", label="each wrench where it is worst", **mark,
+            )  # fmt: skip
+            axes.plot(
+                margins.parameters[k], margins.margins[k], marker="D",
+                label=f"the worst: {wrench_words(margins.corners[k])}", **mark,
+            )  # fmt: skip
+            axes.axhline(0.0, label="limit", **line_style(BOUND))
+            axes.set(xlabel=ALONG, ylabel="margin, share of half the range [-]")
+            axes.margins(x=0.01)
+            axes.legend(loc="best")
+        return figure
 
 
 @verb()
@@ -226,11 +268,11 @@ def plan_path(
     loaded = as_robot(robot, "plan_path")
     if track:
         loaded.servo_rows(TRACKING)  # a refusal comes before the work
-    limit_settings = LimitSettings(
-        tensions=limits, cable_speed=cable_speed, cable_acceleration=cable_acceleration,
-        speed=speed, reserve=reserve,
-    )  # fmt: skip
-    task = robot_task(loaded, limit_settings, pulleys, resist)
+    bounds = robot_limits(
+        loaded, limits, cable_speed=cable_speed, cable_acceleration=cable_acceleration, speed=speed
+    )
+    cables = loaded.cable_set(pulleys)
+    task = path_task(loaded, bounds, cables, reserve=reserve, resist=resist)
     route = path_poses(loaded, value_of(path))
     for remark in route.remarks:
         follow.say(f"note: {path}: {remark}")
@@ -238,15 +280,18 @@ def plan_path(
     way = make_path(loaded, route.poses, corners, tolerance, moves)
     is_file = isinstance(path, Path | str) and not isinstance(path, Word)
     rows = path if isinstance(path, Word) else [pose_in_degrees(X) for X in route.poses]
-    arguments = limit_settings.as_dict(pulleys) | {
-        "path": str(path) if is_file else None, "waypoints": None if is_file else rows,
-        "corners": corners, "tolerance_m": tolerance, "stations": stations,
+    arguments: dict[str, Any] = {
+        "limits_n": limits, "cable_speed_m_s": cable_speed,
+        "cable_acceleration_m_s2": cable_acceleration, "speed_m_s": speed, "reserve": reserve,
+        "pulleys": pulleys, "path": str(path) if is_file else None,
+        "waypoints": None if is_file else rows, "corners": corners, "tolerance_m": tolerance,
+        "stations": stations,
     }  # fmt: skip
     if moves:
-        speeds = [move.speed for move in moves if np.isfinite(move.speed)]
+        feed_rates = [move.speed for move in moves if np.isfinite(move.speed)]
         arguments |= {
             "feeds": feeds, "arcs": sum(move.arc is not None for move in moves),
-            "feed_range_m_s": [min(speeds), max(speeds)] if speeds else None,
+            "feed_range_m_s": [min(feed_rates), max(feed_rates)] if feed_rates else None,
         }  # fmt: skip
     if resist is not None:
         of_file = isinstance(resist, Path | str)
@@ -257,72 +302,10 @@ def plan_path(
         begin = time.perf_counter()
         solution = plan_along_path(task, way, stations)
         plan = PathMotion(
-            robot=loaded, limits=task.limits, arguments=arguments, solution=solution,
+            robot=loaded, limits=bounds, arguments=arguments, solution=solution,
             planning_time=time.perf_counter() - begin, source=route.source,
         )  # fmt: skip
         return finished(
-            plan, limit_settings, results, track=track, stream=stream, stream_model=stream_model,
-            formats=formats, follow=follow,
+            plan, results, track=track, stream=stream, stream_model=stream_model, formats=formats,
+            follow=follow,
         )  # fmt: skip
-
-
-def phase_figure(plan: PathMotion) -> Figure:
-    """Speed along the path below the largest speeds, and which limits are reached where."""
-    solution, samples = plan.solution, plan.samples
-    rows = reached_rows(plan.robot, samples)
-    height = 0.8 + 0.24 * max(len(rows), 1)
-    title = titled(plan, "Speed along the path, and the limits that it reaches")
-    figure = bare_figure((11.0, 5.6 + height), title)
-    stations = solution.trajectory.stations
-    with styled():
-        axes, bars = figure.subplots(2, 1, sharex=True, height_ratios=(4.6, height))
-        top = np.sqrt(solution.largest)
-        axes.plot(
-            stations, np.sqrt(solution.reachable[:, 1]),
-            label="largest from which the end can be reached",
-            **COVERED_LINE | {"color": DESIRED.color, "marker": ""},
-        )  # fmt: skip
-        axes.plot(stations, top, label="largest at this point by itself", **line_style(BOUND))
-        axes.plot(samples.parameters, samples.speeds, label="plan", **line_style(DISTANCE))
-        most = float(np.max(samples.speeds))
-        axes.set_ylim(0.0, min(float(np.nanmax(top, initial=most)), 2.5 * most) * 1.05)
-        axes.set(ylabel="ds/dt [m/s]")
-        axes.legend(loc="lower center")
-        draw_bars(bars, samples.parameters, rows)
-        bars.set(
-            xlabel="way s along the path [m], turns by the length scale", ylabel="limit reached"
-        )
-        axes.margins(x=0.01)
-    return figure
-
-
-def resistance_figure(plan: PathMotion) -> Figure:
-    """What the motion leaves of tensions and torques, alone and under the wrenches to resist."""
-    margins, samples = plan.resisted, plan.samples
-    assert margins is not None
-    assert samples.resisted is not None
-    alone = sample_motion(replace(plan.task, resist=np.empty((0, 6))), plan.motion, samples.times)
-    figure = bare_figure((11.0, 4.6), titled(plan, "What is left under the wrenches to resist"))
-    worst = wrench_words(margins.corners[margins.worst])
-    with styled():
-        axes = figure.subplots()
-        s = samples.parameters
-        axes.plot(s, 1.0 - alone.uses[:, TENSION_USE], label="motion alone", **line_style(IDEAL))
-        label = f"with the worst of {len(margins.corners)} wrenches at each point"
-        axes.plot(s, 1.0 - samples.resisted, label=label, **line_style(DISTANCE))
-        axes.plot(
-            margins.parameters, margins.margins, "o", markersize=4.0, color="black",
-            markerfacecolor="none", label="each wrench where it is worst",
-        )  # fmt: skip
-        axes.plot(
-            margins.parameters[margins.worst], margins.margins[margins.worst], "D", color="black",
-            label=f"the worst: {worst}",
-        )  # fmt: skip
-        axes.axhline(0.0, label="limit", **line_style(BOUND))
-        axes.set(
-            xlabel="way s along the path [m], turns by the length scale",
-            ylabel="margin, share of half the range [-]",
-        )
-        axes.margins(x=0.01)
-        axes.legend(loc="best")
-    return figure

@@ -23,23 +23,15 @@ from cdpr_drake.systems.diagrams.tension_control import (
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop
 from cdpr_drake.systems.robots.compiled_step import StepRule
 
-RATE = 1000.0
-"""Steps of control and rows of the log per second [Hz]."""
-
-MOMENT = 1e-9
-"""Instants that are nearer are one [s]."""
+RATE = 1000.0  # steps of control and rows of the log per second [Hz]
+MOMENT = 1e-9  # instants that are nearer are one [s]
 
 GAINS = TaskGains(stiffness=100.0, damping=20.0)
 """Of the computed torque, as of the scenarios that come with the package."""
 
-REST = 0.2
-"""How long the robot is looked at after the end of its motion [s]."""
-
-METHOD = "quadratic_program"
-"""Tension distribution: exact, for any redundancy."""
-
-ROUNDING = 1e-9
-"""A limit that is missed by less, relative to it, is kept."""
+REST = 0.2  # how long the robot is looked at after the end of its motion [s]
+METHOD = "quadratic_program"  # tension distribution: exact, for any redundancy
+ROUNDING = 1e-9  # a limit that is missed by less, relative to it, is kept
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,11 +112,9 @@ class TrackedPlan(Result):
 
 
 def track_plan(
-    robot: Robot,
-    plan: PathPlan | FreePathSolution,
-    limits: MotionLimits,
-    on_progress: Callable[[float], None] | None = None,
-) -> TrackedPlan:
+    robot: Robot, plan: PathPlan | FreePathSolution, limits: MotionLimits,
+    on_progress: Callable[[float], None] = lambda time: None,
+) -> TrackedPlan:  # fmt: skip
     """Simulates computed torque along a plan, by the compiled loop of dynamic control.
 
     Cables are those of the plan, massless and inextensible, with tensions as commanded; tensions
@@ -142,27 +132,18 @@ def track_plan(
         DivergedError: Numbers are not finite any more.
     """
     motion = plan.motion() if isinstance(plan, FreePathSolution) else plan.trajectory
-    control = build_tension_control(
-        robot,
-        TensionControlSettings(
-            trajectory=motion,
-            gains=GAINS,
-            method=METHOD,
-            limits=(limits.lower, limits.upper),
-            rate=RATE,
-            cables=plan.task.cables,
-            rule=StepRule(method="runge_kutta3", max_step=1.0 / RATE),
-        ),
-    )
-    loop = TensionLoop(control, RATE)
+    settings = TensionControlSettings(
+        trajectory=motion, gains=GAINS, method=METHOD, limits=(limits.lower, limits.upper),
+        rate=RATE, cables=plan.task.cables,
+        rule=StepRule(method="runge_kutta3", max_step=1.0 / RATE),
+    )  # fmt: skip
+    loop = TensionLoop(build_tension_control(robot, settings), RATE)
     end = motion.end_time + REST
     while loop.time < end:
         loop.advance_to(min(loop.time + 1.0, end))
-        if on_progress is not None:
-            on_progress(loop.time)
+        on_progress(loop.time)
     log = loop.read_log()
-    lengths = log["lengths"]
-    speeds = np.diff(lengths, axis=0) * RATE
+    speeds = np.diff(log["lengths"], axis=0) * RATE
     # Accelerations are constant for a step; these are means of two steps.
     accelerations = np.diff(speeds, axis=0) * RATE
     between = 0.5 * (log["tensions"][1:-1] + log["tensions"][2:])

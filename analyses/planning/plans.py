@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,19 +16,18 @@ from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.planning.cable_streams import CableStream, cable_stream
+from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure
 from cdpr_drake.analyses.planning.plan_tracking import MOMENT, RATE, TrackedPlan, track_plan
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, robot_limits
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.visualization.cable_figures import cable_figure, draw_cables
+from cdpr_drake.analyses.visualization.cable_figures import cable_figure
 from cdpr_drake.analyses.visualization.figure_files import figure_writers
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StoppedError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.palette import BOUND, DESIRED, PLATFORM, Look, nth_look
+from cdpr_drake.palette import DESIRED, PLATFORM
 from cdpr_drake.planning.free_path_solution import FreePathSolution
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
@@ -38,11 +37,7 @@ from cdpr_drake.trajectories.timed_path import TimedPath
 
 SUMMARY, MOTION = "summary.json", "motion.csv"
 
-REACHED = 0.99
-"""A limit counts as reached from this share of it on."""
-
-CROWDED = 24
-"""Rows of limits that a figure shows; of more, those that are reached longest."""
+REACHED = 0.99  # a limit counts as reached from this share of it on
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -80,6 +75,10 @@ class Plan(Result):
     def details(self) -> dict[str, Any]:
         """What `as_dict` has of this kind alone."""
 
+    @abstractmethod
+    def description(self) -> list[str]:
+        """Lines on this kind of motion alone."""
+
     @property
     def task(self) -> PathTask:
         """The robot as it was planned with."""
@@ -96,6 +95,11 @@ class Plan(Result):
         """What the motion needs of cables and motors, as often as it is controlled."""
         return self.solution.samples(RATE)
 
+    @cached_property
+    def shares(self) -> Array:
+        """Largest share of a limit at each sample, shape (n,)."""
+        return np.asarray(np.max(self.samples.uses, axis=1))
+
     @property
     def geometry(self) -> str:
         """Geometry of the planned robot's cables in words, as `Robot.geometry_words`."""
@@ -103,11 +107,11 @@ class Plan(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        limits, samples = self.task.limits, self.samples
-        shares = np.max(samples.uses, axis=1)
+        limits = self.task.limits
         result: dict[str, Any] = finite({
             "robot": self.robot.name, "geometry": self.geometry, "arguments": self.arguments,
             **self.details(),
+            "planning_time_s": self.planning_time,
             "limits_of_the_plan": {
                 "tension_n": [limits.lower, limits.upper],
                 "cable_speed_m_s": limits.cable_speed,
@@ -115,8 +119,8 @@ class Plan(Result):
                 "torque_nm": limits.torque,
                 "speed_m_s": limits.speed,
             },
-            "largest_share_of_limits": float(np.max(shares)),
-            "instants_at_a_limit": float(np.mean(shares >= REACHED)),
+            "largest_share_of_limits": float(np.max(self.shares)),
+            "instants_at_a_limit": float(np.mean(self.shares >= REACHED)),
             "reached": self.reached(),
             "tracked": None if self.tracked is None else self.tracked.as_dict(),
             **({} if self.stream is None else {"stream": self.stream.as_dict()}),
@@ -126,10 +130,8 @@ class Plan(Result):
 
     def reached(self) -> dict[str, int]:
         """Steps of control at which each limit is reached, of those that are."""
-        counts = {
-            name: int(np.sum(np.any(holds, axis=1)))
-            for name, holds in self.samples.active().items()
-        }
+        holds = self.samples.active().items()
+        counts = {name: int(np.sum(np.any(rows, axis=1))) for name, rows in holds}
         return {name: count for name, count in counts.items() if count}
 
     def tables(self) -> list[Table]:
@@ -140,22 +142,17 @@ class Plan(Result):
 
     def lines(self) -> list[str]:
         """Duration, what is special of the kind, limits, tracking, stream."""
-        samples, limits = self.samples, self.task.limits
-        shares = np.max(samples.uses, axis=1)
+        tensions, limits = self.samples.tensions, self.task.limits
         lines = [
             *self.description(),
-            f"at a limit in {np.mean(shares >= REACHED):.1%} of all instants; largest share of a "
-            f"limit {np.max(shares):.4f}",
-            f"tensions {np.min(samples.tensions):.4g} to {np.max(samples.tensions):.4g} N, limits "
+            f"at a limit in {np.mean(self.shares >= REACHED):.1%} of all instants; largest share "
+            f"of a limit {np.max(self.shares):.4f}",
+            f"tensions {np.min(tensions):.4g} to {np.max(tensions):.4g} N, limits "
             f"{limits.lower:g} to {limits.upper:g} N",
         ]
         for part in (self.tracked, self.stream):
             lines += [] if part is None else part.lines()
         return lines + ([] if self.folder is None else [f"results: {self.folder}"])
-
-    @abstractmethod
-    def description(self) -> list[str]:
-        """Lines on this kind of motion alone."""
 
     def columns(self) -> dict[str, Array]:
         """A row a step of control: pose, velocity, acceleration, and what cables do.
@@ -180,9 +177,8 @@ class Plan(Result):
             ("cable_acceleration", "cable_accelerations", "m_s2"),
             ("torque", "torques", "nm"),
         ):
-            values = joined(name)
-            for k, cable in enumerate(self.robot.cables):
-                table[f"{quantity}_{cable.name}_{unit}"] = values[:, k]
+            for cable, values in zip(self.robot.cables, joined(name).T, strict=True):
+                table[f"{quantity}_{cable.name}_{unit}"] = values
         table["largest_share_of_limits"] = np.max(joined("uses"), axis=1)
         return table
 
@@ -195,11 +191,55 @@ class Plan(Result):
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """Tensions, winches and the path in space; the stream if there is one."""
         figures: dict[str, Callable[[], Figure]] = {
-            "tensions": partial(tension_figure, self),
-            "winches": partial(winch_figure, self),
-            "path": partial(plan_path_figure, self),
-        }
+            "tensions": self._tension_figure, "winches": self._winch_figure,
+            "path": self._path_figure,
+        }  # fmt: skip
         return figures | ({} if self.stream is None else {"stream": self.stream.plot})
+
+    def titled(self, words: str) -> str:
+        """Title of a figure."""
+        return f"{words}\n{self.title}"
+
+    def _tension_figure(self) -> Figure:
+        """Tensions with their limits: where one is reached, there is no choice."""
+        tensions, limits = self.samples.tensions, self.samples.limits
+        log = {
+            "time": self.samples.times, "tensions": tensions, "slack": np.zeros(tensions.shape),
+        }  # fmt: skip
+        return cable_figure(
+            self.titled("Tensions of the plan, as far from their limits as can be"), self.robot,
+            log, "tensions", "tension [N]",
+            bounds=(round(limits.lower, 3), round(limits.upper, 3)),
+        )  # fmt: skip
+
+    def _winch_figure(self) -> Figure:
+        """Speeds and accelerations of the cables, and torques of the motors, with their limits."""
+        samples, limits = self.samples, self.samples.limits
+        names, panels = [cable.name for cable in self.robot.cables], []
+        for label, values, bound in (
+            ("cable speed [m/s]", samples.cable_speeds, limits.cable_speed),
+            ("cable acceleration [m/s²]", samples.cable_accelerations, limits.cable_acceleration),
+            ("motor torque [N m]", samples.torques, limits.torque),
+        ):
+            if np.all(np.isfinite(values)):  # torques are not, of motors without data
+                near = bound <= 2.0 * float(np.max(np.abs(values)))
+                curves = dict(zip(names, values.T, strict=True))
+                panels.append(Panel(label, curves, (-bound, bound) if near else ()))
+        title, size = self.titled("What the plan asks of winches"), (11.0, 1.2 + 3.0 * len(panels))
+        return panel_figure(title, size, samples.times, panels, one_legend=True)
+
+    def _path_figure(self) -> Figure:
+        """Where the platform goes: the plan, and the simulated robot where it was tracked."""
+        way = self.motion.path
+        assert way is not None
+        points = way.points(np.linspace(0.0, way.length, 400))
+        paths, rows = [Path3D(points[:, 4:7], "Po of the plan", DESIRED)], points[:, :7]
+        if self.tracked is not None:
+            rows = self.tracked.log["X_WP"]
+            paths.append(Path3D(rows[:, 4:], "Po of the simulated robot", PLATFORM))
+        log = {"X_WP": rows, "slack": np.zeros((len(rows), len(self.robot.cables)))}
+        title = self.titled("Path of the platform")
+        return path_figure(title, self.robot, self.task.cables, log, paths)
 
     def write(self, folder: Folder) -> None:
         """Writes motion, stream and summary."""
@@ -218,8 +258,8 @@ Planned = TypeVar("Planned", bound=Plan)
 
 
 def finished(
-    plan: Planned, limit_settings: LimitSettings, results: Folder | None, *, track: bool | None,
-    stream: float | None, stream_model: str | None, formats: Sequence[str], follow: Follow,
+    plan: Planned, results: Folder | None, *, track: bool | None, stream: float | None,
+    stream_model: str | None, formats: Sequence[str], follow: Follow,
 ) -> Planned:  # fmt: skip
     """A plan that is tracked and streamed, if that is asked for, and written into a folder.
 
@@ -228,21 +268,22 @@ def finished(
             written.
         StoppedError: The work was asked to stop.
     """
-    folder = None if results is None else results.path
-    plan = replace(plan, limits=robot_limits(plan.robot, limit_settings), folder=folder)
-    is_point = plan.robot.motion_type().is_point
-    if track is None and results is not None and is_point:
-        follow.say("note: not tracked: computed torque moves bodies alone")
-    if track or (track is None and results is not None and not is_point):
+    if track is None and results is not None:
+        track = not plan.robot.motion_type().is_point
+        if not track:
+            follow.say("note: not tracked: computed torque moves bodies alone")
+    tracked = None
+    if track:
         end, words = plan.motion.end_time, f"Tracking the plan of {plan.robot.name}"
         follow.doing(words)
         tracked = track_plan(
             plan.robot, plan.solution, plan.limits,
             lambda now: follow.doing(f"{words}: {now:.0f} of {end:.0f} s"),
         )  # fmt: skip
-        plan = replace(plan, tracked=tracked)
-    if stream is not None:
-        plan = replace(plan, stream=cable_stream(plan, stream, stream_model))
+    plan = replace(
+        plan, tracked=tracked, folder=None if results is None else results.path,
+        stream=None if stream is None else cable_stream(plan, stream, stream_model),
+    )  # fmt: skip
     if results is not None:
         written(plan, results, formats, follow, plan.pages())
     return plan
@@ -275,80 +316,3 @@ def written(
             "command goes on"
         )
     results.complete()
-
-
-def titled(plan: Plan, words: str) -> str:
-    """Title of a figure."""
-    return f"{words}\n{plan.title}"
-
-
-def reached_rows(robot: Robot, samples: MotionSamples) -> list[tuple[str, Look, Array]]:
-    """Limits that are reached: name, look, and whether it is at each sample, shape (n,)."""
-    rows: list[tuple[str, Look, Array]] = []
-    for name, holds in samples.active().items():
-        for k in range(holds.shape[1]):
-            if not np.any(holds[:, k]):
-                continue
-            whole = holds.shape[1] == len(robot.cables)
-            cable = f"{robot.cables[k].name} " if whole else ""
-            rows.append((f"{cable}{name}", nth_look(k) if whole else PLATFORM, holds[:, k]))
-    longest = sorted(range(len(rows)), key=lambda i: -float(np.sum(rows[i][2])))[:CROWDED]
-    return [rows[i] for i in sorted(longest)]
-
-
-def tension_figure(plan: Plan) -> Figure:
-    """Tensions with the limits that the plan keeps: where one is reached, there is no choice."""
-    samples, limits = plan.samples, plan.samples.limits
-    log = {
-        "time": samples.times,
-        "tensions": samples.tensions,
-        "slack": np.zeros(samples.tensions.shape),
-    }
-    words = "Tensions of the plan, as far from their limits as can be"
-    return cable_figure(
-        titled(plan, words), plan.robot, log, "tensions", "tension [N]",
-        bounds=(round(limits.lower, 3), round(limits.upper, 3)),
-    )  # fmt: skip
-
-
-def winch_figure(plan: Plan) -> Figure:
-    """Speeds and accelerations of the cables, and torques of the motors, with their limits."""
-    samples, limits = plan.samples, plan.samples.limits
-    shown: list[tuple[str, Array, float]] = [
-        ("cable speed [m/s]", samples.cable_speeds, limits.cable_speed),
-        ("cable acceleration [m/s²]", samples.cable_accelerations, limits.cable_acceleration),
-    ]
-    if np.all(np.isfinite(samples.torques)):
-        shown.append(("motor torque [N m]", samples.torques, limits.torque))
-    figure = bare_figure(
-        (11.0, 1.2 + 3.0 * len(shown)), titled(plan, "What the plan asks of winches")
-    )
-    with styled():
-        places: Any = figure.subplots(len(shown), 1, sharex=True)
-        for number, (place, (label, values, bound)) in enumerate(zip(places, shown, strict=True)):
-            draw_cables(place, plan.robot, samples.times, values)
-            if bound <= 2.0 * float(np.max(np.abs(values))):
-                for side in (-bound, bound):
-                    style = line_style(BOUND) | {"linewidth": 1.2, "zorder": 1}
-                    place.axhline(side, label="limit" if side > 0.0 else None, **style)
-            place.set(ylabel=label)
-            place.margins(x=0.01)
-            if number == 0:
-                place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
-        places[-1].set(xlabel="time [s]")
-    return figure
-
-
-def plan_path_figure(plan: Plan) -> Figure:
-    """Where the platform goes: the plan, and the simulated robot where it was tracked."""
-    way = plan.motion.path
-    assert way is not None
-    points = way.points(np.linspace(0.0, way.length, 400))
-    paths = [Path3D(points[:, 4:7], "Po of the plan", DESIRED)]
-    rows = points[:, :7]
-    if plan.tracked is not None:
-        rows = plan.tracked.log["X_WP"]
-        paths.append(Path3D(rows[:, 4:], "Po of the simulated robot", PLATFORM))
-    log = {"X_WP": rows, "slack": np.zeros((len(rows), len(plan.robot.cables)))}
-    title = titled(plan, "Path of the platform")
-    return path_figure(title, plan.robot, plan.task.cables, log, paths)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.planning import DirectCollocation
-from pydrake.solvers import MathematicalProgramResult, Solve
+from pydrake.solvers import Solve
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
@@ -27,12 +27,10 @@ from cdpr_drake.statics.static_tensions import find_static_tensions
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
-ROBOT = "planar"
 RUBBER = 1e8
 """Young's modulus [Pa] of the example's cables: soft, so that there is something to swing on."""
 
-STEP = 2e-4
-"""Integration step of simulations of a plan [s]."""
+STEP = 2e-4  # integration step of simulations of a plan [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,9 +64,8 @@ class RestToRest:
     def simulated_end(self, velocities: Trajectory) -> Array:
         """State at the end of a simulation with these cable velocities, shape (6 + m,)."""
         builder = DiagramBuilder()
-        block = builder.AddNamedSystem(
-            "robot", CableRobot(self.robot, CableRobotSettings(cables=self.cables))
-        )
+        robot = CableRobot(self.robot, CableRobotSettings(cables=self.cables))
+        block = builder.AddNamedSystem("robot", robot)
         source = builder.AddNamedSystem("velocities", TrajectorySource(velocities))
         builder.Connect(source.get_output_port(), block.GetInputPort("cable_velocities"))
         simulator = Simulator(builder.Build())
@@ -85,21 +82,16 @@ class RestToRest:
 
 def example_robot() -> Robot:
     """The planar robot on cables of rubber."""
-    robot = load_robot(ROBOT)
+    robot = load_robot("planar")
     robot.cable.youngs_modulus, robot.cable.retardation_time = RUBBER, 2e-3
     return robot
 
 
 def plan_rest_to_rest(
-    robot: Robot,
-    start: tuple[float, float, float],
-    goal: tuple[float, float, float],
-    duration: float,
-    samples: int = 25,
-    *,
-    cables: CableSettings | None = None,
+    robot: Robot, start: tuple[float, float, float], goal: tuple[float, float, float],
+    duration: float, samples: int = 25, *, cables: CableSettings | None = None,
     bounds: tuple[float, float] = (10.0, 60.0),
-) -> RestToRest:
+) -> RestToRest:  # fmt: skip
     """Plans a motion of least squared cable velocities from rest to rest.
 
     Args:
@@ -115,26 +107,34 @@ def plan_rest_to_rest(
         InfeasibleTensionError: No tensions within the bounds hold a pose on the way.
     """
     settings = cables or CableSettings(pulleys=True)
-    begin, end = np.asarray(start, float), np.asarray(goal, float)
+    begin, way = np.asarray(start, float), np.subtract(goal, start)
     times = np.linspace(0.0, duration, samples)
     share = times / duration
-    way = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
-    rate = 30.0 * share**2 * (1.0 - share) ** 2 / duration
-    lengths = [_lengths(robot, settings, begin + s * (end - begin), bounds) for s in way]
-    states = np.array(
-        [
-            np.concatenate([begin + s * (end - begin), ds * (end - begin), l0])
-            for s, ds, l0 in zip(way, rate, lengths, strict=True)
-        ]
-    ).T
+    places = begin + np.outer(share**3 * (10.0 - 15.0 * share + 6.0 * share**2), way)
+    rates = np.outer(30.0 * share**2 * (1.0 - share) ** 2 / duration, way)
+    lengths = [_lengths(robot, settings, place, bounds) for place in places]
+    states = np.hstack([places, rates, lengths]).T
     winding = np.gradient(states[6:], times, axis=1)
     # Of the straight motion, the integral has to be what the lengths change by.
     winding += ((states[6:, -1] - states[6:, 0]) - np.trapezoid(winding, times))[:, None] / duration
     straight = PiecewisePolynomial.FirstOrderHold(times, winding)
 
-    result, program = _optimize(
-        robot, settings, states, straight, PiecewisePolynomial.FirstOrderHold(times, states)
+    block = CableRobot(robot, CableRobotSettings(cables=settings))
+    context = block.CreateDefaultContext()
+    port = block.GetInputPort("cable_velocities")
+    port.FixValue(context, np.zeros(len(robot.cables)))
+    step = duration / (samples - 1)
+    program = DirectCollocation(
+        block, context, samples, step, step, input_port_index=port.get_index()
     )
+    prog, speed = program.prog(), np.full(len(robot.cables), robot.winch.rated_cable_speed())
+    prog.AddBoundingBoxConstraint(states[:, 0], states[:, 0], program.initial_state())
+    prog.AddBoundingBoxConstraint(states[:, -1], states[:, -1], program.final_state())
+    for k in range(samples):
+        prog.AddBoundingBoxConstraint(-speed, speed, program.input(k))
+    program.AddRunningCost(sum(u * u for u in program.input()))
+    program.SetInitialTrajectory(straight, PiecewisePolynomial.FirstOrderHold(times, states))
+    result = Solve(prog)
     success = bool(result.is_success())
     planned = program.ReconstructInputTrajectory(result) if success else straight
     return RestToRest(
@@ -148,44 +148,14 @@ def _lengths(
 ) -> Array:
     """Unstrained lengths that hold a planar platform at (x, y, theta), shape (m,) [m]."""
     assert robot.plane_height is not None
-    X_WP = RigidTransform(
-        RotationMatrix.MakeZRotation(place[2]), [place[0], place[1], robot.plane_height]
-    )
-    found = find_static_tensions(
+    R = RotationMatrix.MakeZRotation(place[2])
+    X_WP = RigidTransform(R, [place[0], place[1], robot.plane_height])
+    rest = find_static_tensions(
         settings.cable_set(robot), settings.model_of(robot), X_WP, np.zeros(6), bounds, LEVEL
     )
-    if found is None:
+    if rest is None:
         raise InfeasibleTensionError(
             f"{robot.name} cannot hold the platform at ({place[0]:g}, {place[1]:g}) m: no tensions "
             f"within {bounds[0]:g}..{bounds[1]:g} N balance each other"
         )
-    return found.unstrained_lengths
-
-
-def _optimize(
-    robot: Robot,
-    settings: CableSettings,
-    states: Array,
-    velocities: Trajectory,
-    guess: Trajectory,
-) -> tuple[MathematicalProgramResult, DirectCollocation]:
-    """Direct collocation between the first and the last state, with the robot's rated speed."""
-    block = CableRobot(robot, CableRobotSettings(cables=settings))
-    context = block.CreateDefaultContext()
-    port = block.GetInputPort("cable_velocities")
-    port.FixValue(context, np.zeros(len(robot.cables)))
-    step = velocities.end_time() / (states.shape[1] - 1)
-    program = DirectCollocation(
-        block, context, states.shape[1], step, step, input_port_index=port.get_index()
-    )
-    for variables, value in (
-        (program.initial_state(), states[:, 0]),
-        (program.final_state(), states[:, -1]),
-    ):
-        program.prog().AddBoundingBoxConstraint(value, value, variables)
-    speed = np.full(len(robot.cables), robot.winch.rated_cable_speed())
-    for k in range(states.shape[1]):
-        program.prog().AddBoundingBoxConstraint(-speed, speed, program.input(k))
-    program.AddRunningCost(sum(u * u for u in program.input()))
-    program.SetInitialTrajectory(velocities, guess)
-    return Solve(program.prog()), program
+    return rest.unstrained_lengths

@@ -1,11 +1,10 @@
-"""A robot's limits as those of a motion, and the path that users ask for."""
+"""A robot's limits as those of a motion, and its path through poses."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -32,145 +31,101 @@ from cdpr_drake.trajectories.curved_path import Move, curved_path, points_on_arc
 from cdpr_drake.trajectories.pose_path import PosePath, smooth_path, straight_path
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 
-UPWARDS = 5
-"""Row of a spatial vector along which the weight acts."""
+UPWARDS = 5  # row of a spatial vector along which the weight acts
 
 CORNERS = ("smooth", "blend", "rest")
 """What a path does at its poses: a spline through them, straight lines with rounded corners, or
 straight lines with a rest in each corner."""
 
 RESERVE = 0.05
-"""Share of the limits that a plan leaves to the feedback that tracks it, unless told otherwise."""
+"""Default of the share of the limits that a plan leaves to the feedback that tracks it."""
 
-TOLERANCE = 5e-3
-"""How far rounded corners may pass from a pose, where nobody says [m]."""
-
+TOLERANCE = 5e-3  # default of how far rounded corners may pass from a pose [m]
 
 ARC_STEP = float(np.radians(5.0))
-"""Points of an arc that a spline goes through are so far apart, or less [rad]."""
+"""Largest distance of the points of an arc that a spline goes through [rad]."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LimitSettings:
-    """Limits beside those of the robot file; None: the robot's, or none where it has none.
-
-    Attributes:
-        tensions: Smallest and largest tension [N].
-        cable_speed: Largest speed of a cable; None: at the motor's rated speed [m/s].
-        cable_acceleration: Largest acceleration of a cable [m/s^2].
-        speed: Largest speed of Po [m/s].
-        reserve: Share of all limits that is left to feedback, see `MotionLimits.within`. None:
-            nothing.
-    """
-
-    tensions: tuple[float, float] | None = None
-    cable_speed: float | None = None
-    cable_acceleration: float | None = None
-    speed: float | None = None
-    reserve: float | None = None
-
-    def as_dict(self, pulleys: bool) -> dict[str, Any]:
-        """For JSON, with the geometry of the cables that is planned with."""
-        return {
-            "limits_n": self.tensions,
-            "cable_speed_m_s": self.cable_speed,
-            "cable_acceleration_m_s2": self.cable_acceleration,
-            "speed_m_s": self.speed,
-            "reserve": self.reserve,
-            "pulleys": pulleys,
-        }
-
-
-def robot_limits(robot: Robot, settings: LimitSettings) -> MotionLimits:
+def robot_limits(
+    robot: Robot, tensions: tuple[float, float] | None = None, *,
+    cable_speed: float | None = None, cable_acceleration: float | None = None,
+    speed: float | None = None,
+) -> MotionLimits:  # fmt: skip
     """The limits of a robot, without reserve.
 
     Of the rated torque friction takes its largest part first: the static one, and the viscous one
     at the largest cable speed. Layers of cable on the drum are left out: rho is that of the first.
 
+    Args:
+        robot: The robot.
+        tensions: Smallest and largest tension; default: the robot's [N].
+        cable_speed: Largest speed of a cable; default: at the motor's rated speed [m/s].
+        cable_acceleration: Largest acceleration of a cable; default: no limit [m/s^2].
+        speed: Largest speed of Po; default: no limit [m/s].
+
     Raises:
         PlanningError: A limit is not accepted.
     """
-    lower, upper = robot.tension_limits(settings.tensions)
-    winch = robot.winch
-    radii = robot.drum().radii(len(robot.cables))
+    lower, upper = robot.tension_limits(tensions)
+    winch, radii = robot.winch, robot.drum().radii(len(robot.cables))
     if robot.winch_groups().are_shared() or np.ptp(radii) > 0.0:
         raise PlanningError(
             f"robot {robot.name}: found several cables on a winch, or cables of several diameters "
             "on their drums; accepted for a plan: a winch for each cable, all alike"
         )
     ratio = float(radii[0])
-    cable_speed = settings.cable_speed
     if cable_speed is None:
         cable_speed = winch.rated_cable_speed()
-    acceleration, speed = (
-        np.inf if most is None else most for most in (settings.cable_acceleration, settings.speed)
-    )
-    torque = np.inf
-    if winch.motor_torque is not None:
-        torque = winch.motor_torque
-        if winch.friction is not None:
-            torque -= winch.friction.static + winch.friction.viscous * cable_speed / ratio
-        if torque <= 0.0:
-            raise PlanningError(
-                f"robot {robot.name}: winch.motor_torque: found {winch.motor_torque:g} N m, which "
-                "is less than the friction; accepted: more"
-            )
+    torque = np.inf if winch.motor_torque is None else winch.motor_torque
+    if np.isfinite(torque) and winch.friction is not None:
+        torque -= winch.friction.static + winch.friction.viscous * cable_speed / ratio
+    if torque <= 0.0:
+        raise PlanningError(
+            f"robot {robot.name}: winch.motor_torque: found {winch.motor_torque:g} N m, which "
+            "is less than the friction; accepted: more"
+        )
     return MotionLimits(
         lower=lower, upper=upper, cable_speed=cable_speed, torque=torque,
-        cable_acceleration=acceleration, inertia=winch.inertia or 0.0, ratio=ratio, speed=speed,
+        cable_acceleration=np.inf if cable_acceleration is None else cable_acceleration,
+        inertia=winch.inertia or 0.0, ratio=ratio, speed=np.inf if speed is None else speed,
     )  # fmt: skip
 
 
 def path_task(
-    robot: Robot,
-    settings: LimitSettings,
-    cables: CableSet | None = None,
-    resist: SpatialSet | None = None,
-) -> PathTask:
-    """A robot for planning, with its limits less the reserve if one is settings.
+    robot: Robot, limits: MotionLimits | None = None, cables: CableSet | None = None, *,
+    reserve: float = 0.0, resist: SpatialSet | Path | str | None = None,
+) -> PathTask:  # fmt: skip
+    """A robot for planning, with its limits less a reserve.
 
     Args:
         robot: The robot.
-        settings: Limits beside its own.
-        cables: Its cables; None: over its pulleys.
-        resist: Wrenches on the platform that every point of a path must resist; None: none.
+        limits: Limits without reserve; default: `robot_limits`.
+        cables: Its cables; default: over its pulleys.
+        reserve: Share of all limits that is left to feedback, see `MotionLimits.within`.
+        resist: Wrenches on the platform that every point of a path must resist, or their file.
 
     Raises:
         PlanningError: A limit is not accepted, there are too few cables, or the platform moves
             along no axes of W.
         WrenchSetError: The wrenches are no polytope, or have too many corners.
+        CdprError: The file cannot be read.
     """
     dynamics = moved_dynamics(robot)
-    lifts = UPWARDS in dynamics.motions
-    weight = robot.platform.mass * robot.gravity if lifts else 0.0
-    limits = robot_limits(robot, settings).within(settings.reserve or 0.0, weight)
+    weight = robot.platform.mass * robot.gravity if UPWARDS in dynamics.motions else 0.0
+    limits = (robot_limits(robot) if limits is None else limits).within(reserve, weight)
     cables = robot.cable_set() if cables is None else cables
     names = [cable.name for cable in robot.cables]
     if resist is None:
         return PathTask(cables, dynamics, limits, names)
-    rows = resist.corners(dynamics.motions)  # what a planar platform does not feel is left out
-    corners = np.zeros((len(rows), 6))
-    corners[:, list(dynamics.motions)] = rows
-    return PathTask(cables, dynamics, limits, names, corners)
-
-
-def robot_task(
-    robot: Robot, settings: LimitSettings, pulleys: bool,
-    resist: SpatialSet | Path | str | None = None,
-) -> PathTask:  # fmt: skip
-    """The robot as it is planned with; `resist` is a set of wrenches, or its file.
-
-    Raises:
-        CdprError: As `path_task`; the file cannot be read.
-    """
-    cables = robot.cable_set(pulleys)
-    if not isinstance(resist, str | Path):
-        return path_task(robot, settings, cables, resist)
-    wrenches = load_wrench_set(Path(resist))
+    wrenches = resist if isinstance(resist, SpatialSet) else load_wrench_set(Path(resist))
     try:
-        return path_task(robot, settings, cables, wrenches)
+        rows = wrenches.corners(dynamics.motions)
     except WrenchSetError as problem:
-        raise WrenchSetError(f"{resist}: {problem}") from problem
+        file = "" if wrenches is resist else f"{resist}: "
+        raise WrenchSetError(f"{file}{problem}") from problem
+    corners = np.zeros((len(rows), 6))
+    corners[:, list(dynamics.motions)] = rows  # a planar platform feels no others
+    return PathTask(cables, dynamics, limits, names, corners)
 
 
 def pose_in_degrees(X_WP: RigidTransform) -> list[float]:
@@ -211,12 +166,9 @@ def length_scale(robot: Robot) -> float:
 
 
 def make_path(
-    robot: Robot,
-    poses: Sequence[RigidTransform],
-    corners: str,
-    tolerance: float = TOLERANCE,
+    robot: Robot, poses: Sequence[RigidTransform], corners: str, tolerance: float = TOLERANCE,
     moves: Sequence[Move] = (),
-) -> PosePath:
+) -> PosePath:  # fmt: skip
     """The path of a robot through poses.
 
     Args:
@@ -237,22 +189,25 @@ def make_path(
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise PlanningError(f"tolerance: found {tolerance:g}; accepted: above 0 [m]")
     for number, X in enumerate(poses, 1):
-        try:
-            check_pose(robot, X)
-        except TensionProblemError as problem:
-            raise PlanningError(f"path: {number} of {len(poses)} poses: {problem}") from problem
+        _check_place(robot, X, f"{number} of {len(poses)} poses")
     scale = length_scale(robot)
-    if moves:
-        points, ways = points_on_arcs(poses, moves, scale, ARC_STEP)
-        for X in points:
-            try:
-                check_pose(robot, X)
-            except TensionProblemError as problem:
-                raise PlanningError(f"path: on an arc: {problem}") from problem
-        if corners == "smooth":
-            path, speeds = smooth_path(points, scale), np.array([way.speed for way in ways])
-            return replace(path, speeds=speeds if np.any(np.isfinite(speeds)) else None)
-        return curved_path(poses, moves, scale, tolerance if corners == "blend" else 0.0)
-    if corners == "smooth":
-        return smooth_path(poses, scale)
-    return straight_path(poses, scale, tolerance if corners == "blend" else 0.0)
+    rounding = tolerance if corners == "blend" else 0.0
+    if not moves:
+        smooth = corners == "smooth"
+        return smooth_path(poses, scale) if smooth else straight_path(poses, scale, rounding)
+    points, ways = points_on_arcs(poses, moves, scale, ARC_STEP)
+    for X in points:
+        _check_place(robot, X, "on an arc")
+    if corners != "smooth":
+        return curved_path(poses, moves, scale, rounding)
+    speeds = np.array([way.speed for way in ways])
+    return replace(
+        smooth_path(points, scale), speeds=speeds if np.any(np.isfinite(speeds)) else None
+    )
+
+
+def _check_place(robot: Robot, X_WP: RigidTransform, where: str) -> None:
+    try:
+        check_pose(robot, X_WP)
+    except TensionProblemError as problem:
+        raise PlanningError(f"path: {where}: {problem}") from problem

@@ -54,18 +54,14 @@ from cdpr_drake.systems.robots.compiled_step import (
 )
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings
 
-SEGMENTS = 4
-"""Parts of the motion that are shot one by one."""
-
-SPLINES = 12
-"""Splines of the correction of each cable."""
+SEGMENTS = 4  # parts of the motion that are shot one by one
+SPLINES = 12  # splines of the correction of each cable
 
 DEGREE = 3
 
 MOST_ROUNDS = 15
 
-REACHED = 1e-9
-"""Places, and ways in a period of the slowest vibration, that ends may differ by [m]."""
+REACHED = 1e-9  # places, and ways in a period of the slowest vibration, that ends may differ by [m]
 
 SMALL = 1e-6
 """Differences by which the motion is linearised: of states, as `_Shooter.scale` has them, and of
@@ -76,15 +72,10 @@ RANK = 1e-9
 
 
 def plan_shot_rest(
-    robot: Robot,
-    start: RigidTransform,
-    goal: RigidTransform,
-    duration: float,
-    *,
-    cables: CableSettings | None = None,
-    bounds: tuple[float, float] | None = None,
+    robot: Robot, start: RigidTransform, goal: RigidTransform, duration: float, *,
+    cables: CableSettings | None = None, bounds: tuple[float, float] | None = None,
     ratios: Sequence[float] = (1.0,),
-) -> ShapedRest:
+) -> ShapedRest:  # fmt: skip
     """Plans a motion that ends at rest, in the time of a quintic law and not longer.
 
     Args:
@@ -250,12 +241,9 @@ class _Shooter:
         return np.concatenate([place, (other - one)[self._n - nv :]]) / self.scale
 
     def shot(
-        self,
-        state: Array,
-        c: Array,
-        segment: _Segment,
+        self, state: Array, c: Array, segment: _Segment,
         looks: list[tuple[float, Array]] | None = None,
-    ) -> Array:
+    ) -> Array:  # fmt: skip
         """State of the platform at the end of a segment from one at its beginning, shape (n,).
 
         Times and states of the instants between are added to `looks`.

@@ -258,12 +258,21 @@ def options_of(verb: Callable[..., Any]) -> dict[str, str]:
             parameter.kind is not parameter.KEYWORD_ONLY and parameter.default is parameter.empty
         ):
             continue
-        names = [
-            name for part in get_args(parameter.annotation)[1:]
-            if isinstance(part, Parameter) for name in part.name or ()
-        ]  # fmt: skip
+        names = _own_names(parameter)
         found[argument] = names[0] if names else f"--{argument.replace('_', '-')}"
     return found
+
+
+def _own_names(parameter: inspect.Parameter) -> list[str]:
+    """Options that the annotation of an argument names."""
+    parts = get_args(parameter.annotation)[1:]
+    return [name for part in parts if isinstance(part, Parameter) for name in part.name or ()]
+
+
+def _option_words(verb: Callable[..., Any]) -> set[str]:
+    """All options of a verb, of arguments with a place and second names, too."""
+    parameters = inspect.signature(verb, eval_str=True).parameters.values()
+    return {*options_of(verb).values(), *(name for each in parameters for name in _own_names(each))}
 
 
 def _figure_file(word: str) -> tuple[str, Path]:
@@ -306,8 +315,9 @@ def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
         words = f"found {' '.join(problem.unused_tokens or ())!r}{form}; accepted: fewer words"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
         option, info = problem.argument.name, problem.argument.field_info
-        if info.kind is not info.KEYWORD_ONLY and option == f"--{info.name}":
-            option = option.lstrip("-").upper()  # it has no other name than its place
+        only_place = problem.argument.names == (f"--{info.name}",)  # it has no other name
+        if info.kind is not info.KEYWORD_ONLY and only_place:
+            option = option.lstrip("-").upper()
         words = f"{option}: found nothing; accepted: a value"
     return f"{words}; see cdpr {name} --help".replace("  ", " ")
 
@@ -327,8 +337,6 @@ def _owner(
         without: command.verb,
         **{f"with --{f}": verb for f, (verb, _) in command.forms.items()},
     }
-    owners = [
-        how for how, verb in verbs.items() if option in options_of(resolve_name(verb)).values()
-    ]
+    owners = [how for how, verb in verbs.items() if option in _option_words(resolve_name(verb))]
     called = [f"with --{form}" for form in _forms_in(command, command_line)]
     return (called[0] if called else without, " or ".join(owners)) if owners else None

@@ -10,7 +10,7 @@ from itertools import islice, product
 import numpy as np
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import path_task
 from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
 from cdpr_drake.workspaces.cable_interference import box_row
 
@@ -37,7 +37,7 @@ for name, scene in list(product(ROBOTS, SCENES))[:count]:
     robot = cdpr.load_robot(name)
     low, high = robot.reach()
     boxes = [box_row(low + m * (high - low), s * (high - low)) for m, s in np.array(SCENES[scene])]
-    limits = path_task(robot, LimitSettings(reserve=0.05)).limits
+    limits = path_task(robot, reserve=0.05).limits
     proof = ProofSettings(boxes=150_000, cells=2**18, limits=(limits.lower, limits.upper))
     sets = ProvenSets.find(robot, None, None, np.array(boxes), ROBOTS[name], settings=proof)
     pairs = (

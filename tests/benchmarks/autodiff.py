@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import PyFunctionConstraint
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import path_task, robot_limits
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.task_space import floating_wrench
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -91,7 +91,7 @@ def pairs() -> dict[str, tuple[PoseConstraint, Evaluate]]:
     """Constraints by kernels, and the same functions of an array of AutoDiffXd, by name."""
     robot = load_robot("acrobot_large")
     cables = robot.cable_set().without_pulleys()
-    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), reserve=0.0), cables)
+    task = path_task(robot, robot_limits(robot, (1.0, 60.0)), cables)
     terms, here = Terms(task), RelativePose(START)
     balance, apart = TensionBalance(task, here), CableClearance(cables, here, APART)
     camera = robot.camera_mount("onboard").pose.transform()

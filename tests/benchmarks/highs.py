@@ -10,9 +10,9 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.planning.robot_path_task import (
     RESERVE,
-    LimitSettings,
     make_path,
     path_task,
+    robot_limits,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -45,12 +45,10 @@ def benchmark() -> Iterator[Ratio]:
     The program of a station is the smallest of a reachability analysis: the largest (ds/dt)^2 that
     the tensions admit. The plan solves three at each, over two stations.
     """
-    robot, limits = (
-        load_robot("acrobot_large"),
-        LimitSettings(tensions=(1.0, 60.0), reserve=RESERVE),
-    )
-    task, path = path_task(robot, limits), make_path(robot, POSES, "smooth")
-    resisting = path_task(robot, limits, resist=SpatialSet(box=WRENCHES))
+    robot = load_robot("acrobot_large")
+    limits, path = robot_limits(robot, (1.0, 60.0)), make_path(robot, POSES, "smooth")
+    task = path_task(robot, limits, reserve=RESERVE)
+    resisting = path_task(robot, limits, reserve=RESERVE, resist=SpatialSet(box=WRENCHES))
     places = plan_along_path(task, path, STATIONS).trajectory.stations
     programs = station_programs(task, path, places)
     plan = per_call(lambda: plan_along_path(task, path, STATIONS))

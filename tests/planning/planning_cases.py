@@ -7,9 +7,9 @@ from scipy.optimize import linprog
 
 from cdpr_drake.analyses.planning.robot_path_task import (
     RESERVE,
-    LimitSettings,
     make_path,
     path_task,
+    robot_limits,
 )
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -52,8 +52,10 @@ PATHS = {
 """Limits of tensions [N], poses of a path, and wrenches to resist on it."""
 
 
-def limits(tensions=(1.0, 60.0), **more):
-    return LimitSettings(**{"tensions": tensions, "reserve": RESERVE, **more})
+def task_of(robot, tensions=(1.0, 60.0), *, cables=None, resist=None, reserve=RESERVE, **limits):
+    """A robot for planning, with the usual reserve."""
+    limits = robot_limits(robot, tensions, **limits)
+    return path_task(robot, limits, cables, reserve=reserve, resist=resist)
 
 
 @cache
@@ -61,8 +63,8 @@ def case(name, corners="smooth", resist=False):
     """Robot, task and path; nobody changes them."""
     robot = load_robot(name)
     tensions, poses, wrenches = PATHS[name]
-    more = {"resist": wrenches} if resist else {}
-    return robot, path_task(robot, limits(tensions), **more), make_path(robot, poses, corners)
+    task = task_of(robot, tensions, resist=wrenches if resist else None)
+    return robot, task, make_path(robot, poses, corners)
 
 
 @cache
@@ -77,12 +79,12 @@ def damped_acrobot(pulleys=False):
     robot = load_robot("acrobot_large")
     robot.damping = PlatformDamping(translation=7.0, rotation=0.9)
     cables = robot.cable_set() if pulleys else robot.cable_set().without_pulleys()
-    return robot, path_task(robot, LimitSettings(tensions=(1.0, 60.0)), cables)
+    return robot, path_task(robot, robot_limits(robot, (1.0, 60.0)), cables)
 
 
 @cache
 def plain_acrobot():
-    return path_task(load_robot("acrobot_large"), LimitSettings(reserve=0.0))
+    return path_task(load_robot("acrobot_large"))
 
 
 def wrench_of(dynamics, X, V=None, A=None):

@@ -14,7 +14,7 @@ from pydrake.solvers import MathematicalProgram, SnoptSolver
 from pydrake.symbolic import Expression
 from pydrake.systems.primitives import LinearSystem
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, path_task
+from cdpr_drake.analyses.planning.robot_path_task import path_task, robot_limits
 from cdpr_drake.control.task_space import PlatformDynamics
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -214,9 +214,10 @@ def test_the_margin_is_that_of_a_linear_program_and_its_tensions_have_it():
 def test_a_margin_of_tensions_is_the_one_that_is_asked_for(margin):
     """From the given limits, by the linear program; no reserve beside it that nobody stated."""
     robot, low_high = load_robot("acrobot_large"), (1.0, 60.0)
-    task = path_task(robot, LimitSettings(tensions=low_high))
+    limits = robot_limits(robot, low_high)
+    task = path_task(robot, limits)
     assert (task.limits.lower, task.limits.upper) == low_high
-    kept = path_task(robot, LimitSettings(tensions=low_high, reserve=0.05))
+    kept = path_task(robot, limits, reserve=0.05)
     assert kept.limits.lower == pytest.approx(1.0 + 0.05 * robot.platform.mass * robot.gravity)
     feasible, inside = TensionFeasible(task, PlaceAndAngles(), margin=margin), []
     places = [[x, y, z] for x, y in ((0.3, 0.2), (0.45, 0.4)) for z in np.linspace(0.2, 0.8, 6)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.planning.robot_path_task import LimitSettings, make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import pose_error
@@ -17,7 +17,7 @@ from cdpr_drake.planning.free_path_pieces import between, link, samples
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.trajectories.pose_path import straight_path
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row, clearances
-from tests.planning.planning_cases import MARK, RESERVE, limits, slopes
+from tests.planning.planning_cases import MARK, slopes, task_of
 
 START, GOAL = RigidTransform([-0.2, 0.0, 0.35]), RigidTransform([0.2, 0.0, 0.35])
 DURATION = 0.9  # [s]
@@ -36,7 +36,7 @@ def robot_task(com=None):
     robot = load_robot("acrobot_large")
     if com is not None:
         robot.platform.center_of_mass = np.array([0.0, 0.0, com])
-    return robot, path_task(robot, limits(), robot.cable_set().without_pulleys())
+    return robot, task_of(robot, cables=robot.cable_set().without_pulleys())
 
 
 def body_of(robot):
@@ -120,8 +120,7 @@ def test_the_target_stays_in_view_all_along():
 def test_least_time_is_that_of_the_best_path_or_more():
     """A planar robot along a line that symmetry makes the best path."""
     robot = load_robot("planar")
-    settings = LimitSettings(reserve=RESERVE)
-    task = path_task(robot, settings, robot.cable_set().without_pulleys())
+    task = task_of(robot, None, cables=robot.cable_set().without_pulleys())
     ends = RigidTransform([-0.15, 0.0, 0.3]), RigidTransform([0.15, 0.0, 0.3])
     program = FreePathProgram(task, *ends, 8)
     program.AddLeastTime()

@@ -14,13 +14,7 @@ from scipy.linalg import null_space
 from scipy.optimize import linprog, minimize
 
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
-from cdpr_drake.analyses.planning.robot_path_task import (
-    RESERVE,
-    LimitSettings,
-    make_path,
-    path_task,
-    robot_limits,
-)
+from cdpr_drake.analyses.planning.robot_path_task import make_path, robot_limits
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -34,7 +28,7 @@ from cdpr_drake.planning.resistance import resistance_bounds, resisted, resisted
 from cdpr_drake.trajectories.pose_path import POINT_SIZE
 from tests.benchmarks.highs import station_programs
 from tests.planning.convex_timing import convex_time, difference_asks
-from tests.planning.planning_cases import BETWEEN, PATHS, case, limits, planned, pose, wrench_of
+from tests.planning.planning_cases import BETWEEN, PATHS, case, planned, pose, task_of, wrench_of
 
 AGREEMENT = 0.01  # of the time, as the planner promises against a fine program
 TOPPRA = 2e-3  # of the time: its constraints hold at stations, ours at both ends of each interval
@@ -60,7 +54,7 @@ def test_the_time_is_that_of_a_convex_program(name, count):
 
 def test_without_limits_of_speed_the_largest_speed_of_a_station_is_that_of_highs():
     robot = load_robot("acrobot_large")
-    task = path_task(robot, LimitSettings(tensions=(1.0, 60.0), cable_speed=1e3, reserve=RESERVE))
+    task = task_of(robot, cable_speed=1e3)
     path = make_path(
         robot, [pose(0.0, 0.0, 0.2), pose(0.15, -0.1, 0.4), pose(-0.1, 0.1, 0.3)], "smooth"
     )
@@ -143,7 +137,7 @@ def test_where_it_cannot_rest_the_motion_carries_it_through():
     assert np.max(plan.reachable[:, 0]) > 0.1
     assert np.any(np.isnan(plan.largest))
     assert np.max(plan.samples().uses) <= 1.0 + BETWEEN
-    assert track_plan(robot, plan, robot_limits(robot, limits())).keeps_limits()
+    assert track_plan(robot, plan, robot_limits(robot, (1.0, 60.0))).keeps_limits()
 
 
 @pytest.mark.parametrize(("name", "count", "damping"), [
@@ -153,14 +147,13 @@ def test_the_damping_of_a_platform_is_planned_with(name, count, damping):
     """Against the convex program, which has it at the roots, and the simulated damped robot."""
     robot, free = load_robot(name), planned(name)
     robot.damping = PlatformDamping(translation=damping[0], rotation=damping[1])
-    given = limits(PATHS[name][0])
-    task = path_task(robot, given)
+    task = task_of(robot, PATHS[name][0])
     plan = plan_along_path(task, free.path)
     assert plan.duration > (1.0005 if name == "planar" else 1.05) * free.duration
     assert np.max(plan.samples().uses) <= 1.0 + BETWEEN
     reference = convex_time(robot, task, plan.path, count)
     np.testing.assert_allclose(plan.duration, reference, rtol=AGREEMENT)
-    tracked = track_plan(robot, plan, robot_limits(robot, given))
+    tracked = track_plan(robot, plan, robot_limits(robot, PATHS[name][0]))
     assert tracked.keeps_limits()
     assert tracked.errors()[0] < 2e-3
     unplanned = replace(plan, task=task, trajectory=free.trajectory)

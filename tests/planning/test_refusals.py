@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.solvers import MathematicalProgram
 
-from cdpr_drake.analyses.planning.robot_path_task import make_path, path_task
+from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.errors import CdprError, PlanningError, WrenchSetError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.box_timing import time_within_box
@@ -41,9 +41,9 @@ from tests.planning.planning_cases import (
     SETS_BOX,
     case,
     damped_acrobot,
-    limits,
     plain_acrobot,
     pose,
+    task_of,
 )
 from tests.planning.test_constraints import servo
 from tests.planning.test_free_path import GOAL as FREE_GOAL
@@ -84,8 +84,8 @@ def few_cables():
 
 def along(*poses, corners="smooth", stations=200, resist=None, **settings):
     robot = load_robot("acrobot_large")
-    more = {} if resist is None else {"resist": SpatialSet(box=np.array(resist))}
-    task = path_task(robot, limits(**settings), **more)
+    wrenches = None if resist is None else SpatialSet(box=np.array(resist))
+    task = task_of(robot, resist=wrenches, **settings)
     return plan_along_path(task, make_path(robot, list(poses), corners), stations)
 
 
@@ -123,11 +123,11 @@ def resisting(poses, force=9.0):
 def held_under_wrench():
     robot = load_robot("acrobot_large")
     wrenches = SpatialSet(box=np.array([0.0, 0, 0, 9.0, 0, 0]))
-    check_held(path_task(robot, limits(), resist=wrenches), PATHS["acrobot_large"][1][0], "start")
+    check_held(task_of(robot, resist=wrenches), PATHS["acrobot_large"][1][0], "start")
 
 
 def elliptic():
-    path_task(load_robot("planar"), limits(None), resist=SpatialSet(ellipsoid=np.ones(6)))
+    task_of(load_robot("planar"), None, resist=SpatialSet(ellipsoid=np.ones(6)))
 
 
 def in_sets(start=START, goal=GOAL, sets=None, **more):

@@ -8,9 +8,9 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.planning.robot_path_task import (
     RESERVE,
-    LimitSettings,
     make_path,
     path_task,
+    robot_limits,
 )
 from cdpr_drake.analyses.simulation.tension_control_run import (
     run_tension_scenario,
@@ -23,9 +23,9 @@ from tests.analyses.front.front_checks import as_json, one_line, shows_itself
 
 def test_a_plan(planar, aside):
     found = cdpr.plan_path(planar, [None, aside], speed=0.5, stations=60)
-    given = LimitSettings(speed=0.5, reserve=RESERVE)
+    task = path_task(planar, robot_limits(planar, speed=0.5), reserve=RESERVE)
     way = make_path(planar, [planar.home.transform(), aside.transform()], "smooth")
-    expected = plan_along_path(path_task(planar, given), way, 60)
+    expected = plan_along_path(task, way, 60)
     assert found.solution.duration == expected.duration
     told = as_json(found)
     assert told["duration_s"] == expected.duration

@@ -2,38 +2,43 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from cdpr_drake.cli.app import main
 from tests.messages import printed
 
+WRITES = "cdpr_drake.analyses.planning.plans.figure_writers"
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Commands draw no figures."""
+    monkeypatch.setattr(WRITES, lambda *_: {})
+
 
 def run(capsys, *words):
-    """Exit code, stdout and stderr of a command line after `cdpr plan`."""
+    """Exit code, stdout and stderr, without line breaks, of words after `cdpr plan`."""
     with pytest.raises(SystemExit) as end:
         main(["plan", *words])
     out, err = printed(capsys)
     return end.value.code, out, err
 
 
-WRITES = "cdpr_drake.analyses.planning.plans.figure_writers"
-"""What a test of a command without its figures makes do nothing."""
-
-
-def undrawn(*_):
-    """No figures."""
-    return {}
-
-
-def planned(folder, *words, pictures=True):
-    """The summary of a plan that is written into a folder, with figures or without."""
-    with pytest.MonkeyPatch.context() as patch:
-        if not pictures:
-            patch.setattr(WRITES, undrawn)
-        with pytest.raises(SystemExit) as end:
-            main(["plan", *words, "--out", str(folder), "--json"])
+def planned(folder, *words):
+    """The summary of a plan that is written into a folder."""
+    with pytest.raises(SystemExit) as end:
+        main(["plan", *words, "--out", str(folder), "--json"])
     assert end.value.code == 0
+    return summary(folder)
+
+
+def summary(folder):
     return json.loads((folder / "summary.json").read_text())
+
+
+def table(folder, name="motion.csv"):
+    return np.genfromtxt(folder / name, delimiter=",", names=True)
 
 
 def drawn(folder, *names):
