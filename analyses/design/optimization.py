@@ -28,6 +28,7 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
@@ -44,7 +45,6 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DesignError, accepted_names
@@ -201,7 +201,7 @@ class Design(Result):
         return figures
 
     def _progress(self) -> Figure:
-        from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+        from cdpr_drake.analyses.frame.figures import line_style, new_figure
 
         search = self.search
         figure, axes = new_figure(1, 1, (7.5, 5.0), f"{self.robot}: search")
@@ -223,7 +223,7 @@ class Design(Result):
         return figure
 
     def _pareto(self) -> Figure:
-        from cdpr_drake.analyses.visualization.figure_style import new_figure
+        from cdpr_drake.analyses.frame.figures import new_figure
 
         search, signs, look = self.search, goal_signs(self.search.names), nth_look(1)
         pairs = list(pairwise(range(len(signs))))
@@ -258,7 +258,7 @@ class Design(Result):
         return figure
 
     def _points(self) -> Figure:
-        from cdpr_drake.analyses.visualization.figure_style import few_ticks, new_figure
+        from cdpr_drake.analyses.frame.figures import few_ticks, new_figure
 
         search = self.search
         assert search.best is not None

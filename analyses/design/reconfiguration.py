@@ -15,6 +15,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.design.rails import load_rails, put_rails, rails_of
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.folder import Folder, results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Result, Table
@@ -35,7 +36,6 @@ from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.analyses.workspaces.workspace_files import load_wrench_set
 from cdpr_drake.arrays import Array
@@ -172,7 +172,7 @@ class Reconfiguration(Result):
         return {"rails": self._draw}
 
     def _draw(self) -> Figure:
-        from cdpr_drake.analyses.visualization.figure_style import bare_figure, styled
+        from cdpr_drake.analyses.frame.figures import bare_figure, styled
 
         figure = bare_figure(
             (11.0, 6.0),

@@ -13,6 +13,7 @@ import numpy as np
 from cyclopts import Parameter
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
@@ -47,7 +48,6 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     pose_in_degrees,
     robot_limits,
 )
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.workspace_files import load_obstacles
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError

@@ -13,6 +13,13 @@ import numpy as np
 from cyclopts import Parameter, Token
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import (
+    COVERED_LINE,
+    DEFAULT_FORMATS,
+    bare_figure,
+    line_style,
+    styled,
+)
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
@@ -41,13 +48,6 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     pose_in_degrees,
     robot_limits,
-)
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
-from cdpr_drake.analyses.visualization.figure_style import (
-    COVERED_LINE,
-    bare_figure,
-    line_style,
-    styled,
 )
 from cdpr_drake.cables.models import CATENARY, ELASTIC
 from cdpr_drake.models.robot_loader import as_robot

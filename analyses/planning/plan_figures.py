@@ -9,8 +9,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.visualization.curves import draw_bars, draw_curve, phase_of
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, line_style, styled
+from cdpr_drake.analyses.frame.figures import (
+    bare_figure,
+    draw_bars,
+    draw_curve,
+    line_style,
+    phase_of,
+    styled,
+)
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, PLATFORM, Look, nth_look

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 from matplotlib.figure import Figure
 
+from cdpr_drake.analyses.frame.figures import figure_writers
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
@@ -22,7 +23,6 @@ from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.figure_files import figure_writers
 from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StoppedError

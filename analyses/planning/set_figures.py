@@ -15,8 +15,8 @@ from pydrake.geometry import Capsule, Convex, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial import ConvexHull
 
+from cdpr_drake.analyses.frame.figures import bare_figure, styled
 from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure, thick
-from cdpr_drake.analyses.visualization.figure_style import bare_figure, styled
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import pose_row

@@ -15,6 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.figures import figure_writers
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
 from cdpr_drake.analyses.frame.follow import Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
@@ -22,7 +23,6 @@ from cdpr_drake.analyses.frame.result import STOPPED, Result
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.visualization.figure_files import figure_writers
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DataFileError, StoppedError, SweepError
 from cdpr_drake.models.robot_schema import Robot

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.visualization.figure_style import new_figure, plain_numbers
+from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import OUTLINE

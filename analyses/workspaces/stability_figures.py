@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cdpr_drake.analyses.visualization.figure_style import (
+from cdpr_drake.analyses.frame.figures import (
     COVERED_LINE,
     bare_figure,
     few_ticks,

@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
+from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -31,7 +32,6 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import whole_file
-from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.analyses.workspaces.box_certificates import (
     box_search,
     certified_boxes,

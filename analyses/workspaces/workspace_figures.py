@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.visualization.figure_style import line_style, new_figure
+from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
 from cdpr_drake.analyses.workspaces.plane_panels import (
     CORNERS,
