@@ -290,11 +290,11 @@ def assess_stability(
     poses = make_grid(loaded, robot, grid, orientation)
     options = VerdictOptions(draws=draws, seed=seed, searches=searches, pieces=pieces)
     view = None if scenario is None else scenario_view(robot, scenario)
+    held = static_case(loaded, limits, mass, as_wrench(wrench, force, moment), pulleys)
     servo = robot_stability(
         robot, poses, view, scheme=scheme, verdict=verdict, bounds=bounds, options=options,
         printed_matrix=printed_matrix,
     )  # fmt: skip
-    held = static_case(loaded, limits, mass, as_wrench(wrench, force, moment), pulleys)
     named = _variations(servo.bounds, BASE if bounds is None else GIVEN, vary)
     over = held.cables.has_pulleys()
     arguments = plain({
