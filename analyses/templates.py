@@ -88,7 +88,7 @@ def write_template(
             "beginning with '.'"
         )
     if robot is not None and (kind != SCENARIO or source is not None):
-        beside = kind if source is None else f"--from {source}"
+        beside = kind if source is None else f"source {source}"
         raise CdprError(f"robot: found {robot} with {beside}; accepted: with scenario, alone")
     if kind in BLOCKS:
         if source is not None:

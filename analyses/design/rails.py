@@ -95,7 +95,8 @@ def rails_of(robot: Robot, groups: Sequence[Sequence[str]] = ()) -> tuple[Rails,
     }
     if not on_rails:
         raise PlanningError(
-            f"robot {robot.name}: found no cables[].rail; accepted: rails in its file, or --rails"
+            f"robot {robot.name}: found no cables[].rail; accepted: those of its file, or with "
+            "rails"
         )
     grouped = {name for group in groups for name in group}
     together = [*groups, *([name] for name in on_rails if name not in grouped)]

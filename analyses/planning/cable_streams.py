@@ -260,5 +260,5 @@ def _unstrained(cables: CableSet, model: str, X: RigidTransform, t: Array, when:
     k = int(np.argmax(np.abs(off)))
     raise PlanningError(
         f"stream: at {when:.4g} s: found no length at which cable {k + 1} has {t[k]:.4g} N with "
-        "its weight; accepted: tensions that carry the cable, by --limits"
+        "its weight; accepted: tensions that carry the cable, with limits"
     )

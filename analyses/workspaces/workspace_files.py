@@ -141,8 +141,8 @@ def load_wrench_set(path: Path) -> SpatialSet:
         raise WrenchSetError(f"{path}: {problem}") from problem
     if wrenches.is_zero():
         raise WrenchSetError(
-            f"{path}: found no wrench but zero; accepted: vertices, a box or an ellipsoid; the "
-            "weight alone is --kind static"
+            f"{path}: found no wrench but zero; accepted: vertices, a box or an ellipsoid; "
+            "static is the kind for the weight alone"
         )
     return wrenches
 

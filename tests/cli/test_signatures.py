@@ -1,6 +1,9 @@
 """Whatever a verb declares is refused in a line that names the option, for all commands alike."""
 
+import ast
 import inspect
+import re
+from pathlib import Path
 from pkgutil import resolve_name
 
 import pytest
@@ -72,6 +75,50 @@ def test_every_argument_has_words_and_a_verb_names_no_option(name):
     if COMMANDS[name].verb.startswith("cdpr_drake.analyses"):
         code = inspect.getsource(verb).rpartition('"""')[2]
         assert [option for option in options_of(verb).values() if f'"{option}"' in code] == []
+
+
+VERBS = [
+    (verb, name) for name, command in COMMANDS.items()
+    for verb in (command.verb, *(verb for verb, _ in command.forms.values()))
+    if verb.startswith("cdpr_drake.analyses")
+]  # fmt: skip
+
+SETTINGS = ("DesignSettings", "ProofSettings")
+"""Public classes of settings: the schema of a file, and what `ProvenSets` are made with."""
+
+CARRIED = 5
+"""So many fields of a class may have the name of an option by chance."""
+
+TYPES = ("Parameter", "words", "one_of", "_names")
+"""What makes types of arguments, which may name options."""
+
+
+def room_of(verb):
+    """Sources of a verb's module, or of its folder if that is a room of its own."""
+    path = Path(inspect.getfile(inspect.unwrap(resolve_name(verb))))
+    return [path] if path.parent.name == "analyses" else sorted(path.parent.glob("*.py"))
+
+
+@pytest.mark.parametrize(("verb", "name"), VERBS)
+def test_an_option_stands_in_its_signature_and_docstring_only(verb, name):
+    options = options_of(resolve_name(verb))
+    for path in room_of(verb):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        types = [
+            part for call in ast.walk(tree)
+            if isinstance(call, ast.Call) and getattr(call.func, "id", "") in TYPES
+            for part in ast.walk(call)
+        ]  # fmt: skip
+        docstrings = [node.value for node in ast.walk(tree) if isinstance(node, ast.Expr)]
+        allowed = {id(node) for node in (*types, *docstrings)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                text = re.sub("cdpr [a-z-]+ --[a-z-]+", "", node.value)  # a whole command
+                named = set(options.values()) & set(re.findall("--[a-z-]+", text))
+                assert id(node) in allowed or not named, f"{path.name}:{node.lineno}: {named}"
+            if isinstance(node, ast.ClassDef) and node.name not in SETTINGS:
+                fields = [part.target.id for part in node.body if isinstance(part, ast.AnnAssign)]
+                assert len(options.keys() & set(fields)) <= CARRIED, f"{path.name}: {node.name}"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
