@@ -35,6 +35,7 @@ from typing import Any
 
 import cdpr_drake
 from cdpr_drake.analyses import installation, view
+from cdpr_drake.analyses.frame.folder import LOCK
 from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.studies.study import STUDIES, Study
 from cdpr_drake.analyses.workspaces.stability import Stability
@@ -188,7 +189,10 @@ def judge(case: Case, status: int | None, out: str, err: str, before: dict[str, 
     if changed:
         yield f"deleted: {changed}"
     new = [p for p in after if p not in before]
-    half = [p for p in new if Path(p).name.startswith(".part-") or "-work-" in p or ".lock" in p]
+    half = [
+        p for p in new if Path(p).name != LOCK
+        and (Path(p).name.startswith(".part-") or "-work-" in p or ".lock" in p)
+    ]  # fmt: skip
     if half and status is not None:
         yield f"half: {half[:4]}"
     if code == 2:
