@@ -306,8 +306,7 @@ def plane(axes: Any, values: Array, label: str, **more: Any) -> None:
         label: Words and unit of the scale of colours.
         more: Passed on to `imshow`.
     """
-    shown = np.where(np.isfinite(values), values, np.nan)
-    image = axes.imshow(shown, cmap="cividis", interpolation="nearest", **more)
+    image = axes.imshow(values, cmap="cividis", interpolation="nearest", **more)
     axes.figure.colorbar(image, ax=axes, label=label)
     axes.grid(visible=False)
 
