@@ -8,7 +8,7 @@ changes the settings of matplotlib.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from io import BytesIO
 from pathlib import Path
@@ -134,6 +134,16 @@ def panels(
     for free in axes[max(count, 1) :]:
         free.remove()
     return figure, axes[: max(count, 1)]
+
+
+def shared_legend(figure: Figure, panels: Iterable[Any], ncols: int) -> None:
+    """A legend below all panels, which names each label once."""
+    handles = {
+        label: handle
+        for axes in panels
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=ncols)
 
 
 def spread(figure: Figure, room: float) -> None:
@@ -296,8 +306,7 @@ def plane(axes: Any, values: Array, label: str, **more: Any) -> None:
         label: Words and unit of the scale of colours.
         more: Passed on to `imshow`.
     """
-    shown = np.where(np.isfinite(values), values, np.nan)
-    image = axes.imshow(shown, cmap="cividis", interpolation="nearest", **more)
+    image = axes.imshow(values, cmap="cividis", interpolation="nearest", **more)
     axes.figure.colorbar(image, ax=axes, label=label)
     axes.grid(visible=False)
 

@@ -13,12 +13,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.figures import (
     DEFAULT_FORMATS,
+    curves,
     draw_curve,
     figure_writers,
     line_style,
     new_figure,
-    phase_of,
     shade,
+    shared_legend,
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
@@ -137,14 +138,9 @@ def phase_figure(run: PickAndPlaceRun) -> Figure:
     for name, look, label in (("X_WP", PLATFORM, "platform, Po"), ("X_WB", TARGET, "box, Bo")):
         draw_curve(axes[0], times, np.asarray(log[name])[:, 6], look, label, scale=1e3)
     axes[0].set(ylabel="height z in W [mm]")
-    draw_curve(
-        axes[1], times, distance, nth_look(2), "box from the goal, distance [mm]",
-        scale=1e3, phase=phase_of(0, 2),
-    )  # fmt: skip
-    draw_curve(
-        axes[1], times, np.degrees(angle), nth_look(3), "box from the goal, angle [deg]",
-        phase=phase_of(1, 2),
-    )  # fmt: skip
+    off = np.column_stack([1e3 * distance, np.degrees(angle)])
+    words = ("box from the goal, distance [mm]", "box from the goal, angle [deg]")
+    curves(axes[1], times, off, words, numbers=(2, 3))
     axes[1].set(ylabel="from the goal [mm], [deg]", yscale="log", ylim=(SUB_MILLIMETRE, None))
     draw_curve(axes[2], times, drift, ESTIMATED, "platform against its dead reckoning", scale=1e3)
     axes[2].set(ylabel="error of dead reckoning [mm]", xlabel="time [s]")
@@ -154,9 +150,7 @@ def phase_figure(run: PickAndPlaceRun) -> Figure:
         shade(one, times, unseen(log) & ~_is_hidden(run), "tag that is needed not seen", SHADED)
         for begin, _ in spans.values():
             one.axvline(begin, color=SHADED.color, linewidth=0.8, zorder=0)
-    found = {label: handle for one in axes
-             for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}  # fmt: skip
-    figure.legend(found.values(), found.keys(), loc="outside lower center", ncols=3)
+    shared_legend(figure, axes, ncols=3)
     for phase, (begin, end) in spans.items():
         if end - begin < 0.02 * times[-1]:
             continue

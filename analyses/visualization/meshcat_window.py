@@ -42,15 +42,13 @@ PAGE_PORTS = range(7000, 7100)
 """Of which the first free one is taken where none is named."""
 
 _INSIDE = "127.0.0.1"
-"""Where Meshcat itself listens, and the door connects from."""
+"""Address at which Meshcat itself listens, and from which the door connects."""
 
 _PATIENCE = 10.0
 """Time for Meshcat to answer, and for a browser to ask [s]."""
 
-_MOST_HEAD = 16_384
-"""Of what a browser asks [byte]."""
-
-_PIECE = 65_536
+_MOST_HEAD, _PIECE = 16_384, 65_536
+"""Largest head of a request, and largest piece of an answer [byte]."""
 
 _CLOSE, _PING, _PONG = 8, 9, 10
 """Kinds of frames of a WebSocket that say nothing to Drake."""
@@ -105,42 +103,32 @@ def page_address(meshcat: Meshcat, host: str | None = None) -> str:
     page = _scenes[meshcat.port()].page
     if page is None:
         raise MeshcatError("meshcat: found one without a page; open it with a host or a port")
-    given, port = page
-    host = given if host is None else host
-    name = socket.gethostname() if host in EVERYWHERE else host
-    return f"http://{f'[{name}]' if ':' in name else name}:{port}"
+    host = page[0] if host is None else host
+    return f"http://{_at_port(socket.gethostname() if host in EVERYWHERE else host, page[1])}"
+
+
+def _at_port(name: str, port: int) -> str:
+    return f"[{name}]:{port}" if ":" in name else f"{name}:{port}"
 
 
 def _listening(host: str, port: int | None) -> socket.socket:
-    """A socket for browsers.
-
-    Raises:
-        MeshcatError: The host is not this machine, or the port is taken.
-    """
-    name = "" if host in EVERYWHERE else host
+    """A socket for browsers."""
+    name = "0.0.0.0" if host in EVERYWHERE else host
     try:
-        found = socket.getaddrinfo(name or "0.0.0.0", 0, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as problem:
-        raise _not_here(host, problem) from problem
-    family, _, _, _, address = found[0]
-    try:
+        family, _, _, _, address = socket.getaddrinfo(name, 0, type=socket.SOCK_STREAM)[0]
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.bind(address)
-    except OSError as problem:
-        raise _not_here(host, problem) from problem
-    for one in PAGE_PORTS if port is None else (port,):
+    except (OSError, UnicodeError) as problem:
+        raise MeshcatError(
+            f"host: found {host!r}: {getattr(problem, 'strerror', None) or problem}; accepted: a "
+            "name or address of this machine, or * for all of them"
+        ) from problem
+    for candidate in PAGE_PORTS if port is None else (port,):
         with suppress(OSError):
-            return socket.create_server((address[0], one), family=family, backlog=64)
+            return socket.create_server((address[0], candidate), family=family, backlog=64)
     where = "any of the ports 7000 to 7099" if port is None else f"port {port}"
     raise MeshcatError(
         f"host, port: {host} cannot listen at {where}, taken perhaps; name another port"
-    )
-
-
-def _not_here(host: str, problem: Exception) -> MeshcatError:
-    return MeshcatError(
-        f"host: found {host!r}: {getattr(problem, 'strerror', None) or problem}; accepted: a "
-        "name or address of this machine, or * for all of them"
     )
 
 
@@ -152,7 +140,7 @@ def _allowed_hosts(host: str, listening: socket.socket) -> frozenset[str] | None
     names = {host, listening.getsockname()[0]}
     if names & {LOCAL, _INSIDE, "::1"}:
         names |= {LOCAL, _INSIDE, "::1"}
-    return frozenset(f"{f'[{name}]' if ':' in name else name}:{port}" for name in names)
+    return frozenset(_at_port(name, port) for name in names)
 
 
 def _sealed_meshcat() -> Meshcat:
@@ -293,14 +281,14 @@ def _own_listener(port: int) -> socket.socket | None:
         try:
             if not stat.S_ISSOCK(os.fstat(int(name)).st_mode):
                 continue  # a copy of what is no socket would stay open
-            found = socket.socket(fileno=os.dup(int(name)))
+            copy = socket.socket(fileno=os.dup(int(name)))
         except OSError:  # closed meanwhile
             continue
         with suppress(OSError):
-            listens = found.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
-            if listens and found.getsockname() == (_INSIDE, port):
-                return found
-        found.close()
+            listens = copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+            if listens and copy.getsockname() == (_INSIDE, port):
+                return copy
+        copy.close()
     return None
 
 
@@ -358,13 +346,13 @@ class MeshcatDoor:
 
 def _head(browser: socket.socket) -> bytes:
     """What a browser asks; raises ValueError where it is too long, or ends before."""
-    found = b""
-    while b"\r\n\r\n" not in found:
+    head = b""
+    while b"\r\n\r\n" not in head:
         piece = browser.recv(_PIECE)
-        if not piece or len(found) > _MOST_HEAD:
+        if not piece or len(head) > _MOST_HEAD:
             raise ValueError("no head of a request")
-        found += piece
-    return found[: found.index(b"\r\n\r\n") + 4]
+        head += piece
+    return head[: head.index(b"\r\n\r\n") + 4]
 
 
 def _fields(head: bytes) -> dict[str, str]:
@@ -419,13 +407,13 @@ def _frames(browser: socket.socket) -> Iterator[tuple[int, bytes]]:
 
 
 def _exactly(browser: socket.socket, size: int) -> bytes:
-    found = b""
-    while len(found) < size:
-        piece = browser.recv(size - len(found))
+    content = b""
+    while len(content) < size:
+        piece = browser.recv(size - len(content))
         if not piece:
             raise ValueError("the browser has gone")
-        found += piece
-    return found
+        content += piece
+    return content
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.frame.figures import bare_figure, line_style, styled
+from cdpr_drake.analyses.frame.figures import bare_figure, line_style, shared_legend, styled
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.cables.models import KELVIN_VOIGT
@@ -83,12 +83,7 @@ def path_figure(
         half = 0.55 * max(float(np.max(high - low)), 1e-3)
         set_box(close, (low + high) / 2.0 - half, (low + high) / 2.0 + half)
         close.set_title("the paths, close up", fontsize=11)
-        handles = {
-            label: handle
-            for axes in (close, whole)
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4)
+        shared_legend(figure, (close, whole), ncols=4)
     return figure
 
 
@@ -195,4 +190,5 @@ def _draw_triad(axes: Any, X_WF: RigidTransform, size: float, name: str) -> None
         axes.plot(*np.column_stack([origin, tip]), "k-", linewidth=1.4)
         axes.text(*(origin + 1.2 * size * column), letter, fontsize=8, ha="center", va="center")
     side = "top" if name == "W" else "bottom"  # so that frames at one place keep both names
-    axes.text(*origin, f"{name} ", fontsize=11, ha="right", va=side)
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.75}
+    axes.text(*origin, f"{name} ", fontsize=11, ha="right", va=side, bbox=box, zorder=10)

@@ -55,7 +55,7 @@ def draw_solid(
         )  # fmt: skip
     else:
         axes.text2D(
-            0.5, 0.3, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9,
+            0.5, 0.5, NO_CELL, transform=axes.transAxes, ha="center", va="center", fontsize=9,
             zorder=6, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5, "alpha": 0.85},
         )  # fmt: skip
     edge = _draw_frame(axes, *frame)

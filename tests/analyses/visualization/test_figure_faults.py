@@ -7,6 +7,7 @@ from cdpr_drake.analyses.frame.figures import bare_figure, new_figure, styled
 from cdpr_drake.analyses.studies.servo_figures import fit_box, path
 from cdpr_drake.analyses.visualization.solids import NO_CELL, draw_solid
 from cdpr_drake.palette import nth_look
+from cdpr_drake.workspaces.volume import surface_quads
 from tests.figure_faults import figure_faults
 
 
@@ -24,22 +25,9 @@ def test_a_good_figure_has_no_faults():
     assert figure_faults(figure) == []
 
 
-def cut(axes):
-    axes.figure.text(0.97, 0.5, "far to the right")  # for which the layout makes no room
-
-
-def on_words(axes):
-    axes.text(0.5, 1.5, "one")
-    axes.text(0.5, 1.5, "two")
-
-
-def turned(axes):
-    axes.text(0.5, 1.5, "along a line", rotation=40.0)
-    axes.text(0.5, 1.5, "across it", rotation=-40.0)
-
-
-def over_curve(axes):
-    axes.legend(loc="center right")
+def two_words(axes, *angles):
+    for words, angle in zip(("along a line", "across it"), angles, strict=True):
+        axes.text(0.5, 1.5, words, rotation=angle)
 
 
 def over_bars(axes):
@@ -57,18 +45,17 @@ def offset(axes):
     axes.set_ylim(1e6, 1e6 + 1e-3)
 
 
-def small(axes):
-    axes.text(0.5, 1.5, "who reads this", fontsize=5.0)
+SPOILED = [  # the layout makes no room for words of the figure
+    (lambda axes: axes.figure.text(0.97, 0.5, "far to the right"), "cut off"),
+    (lambda axes: two_words(axes, 0.0, 0.0), "on each other"),
+    (lambda axes: two_words(axes, 40.0, -40.0), "on each other"),
+    (lambda axes: axes.legend(loc="center right"), "legend over curve"),
+    (over_bars, "legend over bars"), (under_legend, "on a legend"), (offset, "offset"),
+    (lambda axes: axes.text(0.5, 1.5, "who reads this", fontsize=5.0), "letters of 5 pt"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("spoil", "words"),
-    [
-        (cut, "cut off"), (on_words, "on each other"), (turned, "on each other"),
-        (over_curve, "legend over curve"), (over_bars, "legend over bars"),
-        (under_legend, "on a legend"), (offset, "offset"), (small, "letters of 5 pt"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("spoil", "words"), SPOILED, ids=[words for _, words in SPOILED])
 def test_each_fault_is_seen(spoil, words):
     figure, axes = plain()
     with styled():
@@ -109,10 +96,16 @@ def test_words_in_space_are_where_they_are_drawn():
     assert faults == ["cut off: 'outside'", "on each other: 'within' and 'there too'"]
 
 
-def test_a_frame_without_a_solid_says_so():
-    figure = bare_figure((8.6, 5.4), "Nothing")
-    corners = np.array([-0.5, -0.5, 0.0]), np.array([0.5, 0.5, 1.1])
+@pytest.mark.parametrize("upper", [(0.5, 0.5, 1.1), (7.0, 5.0, 6.0)])
+def test_solids_have_labels_of_their_axes_beside_ticks_or_say_that_there_is_none(upper):
+    figure = bare_figure((13.0, 5.4), "Solids")
+    frame = np.array([-upper[0], -upper[1], 0.0]), np.array(upper)
+    ends = [np.linspace(0.4 * low, 0.4 * high, 4) for low, high in zip(*frame, strict=True)]
+    quads = surface_quads(np.ones((4, 4, 4), bool), ends), np.empty((0, 4, 3))
     with styled():
-        axes = figure.add_subplot(projection="3d", computed_zorder=False)
-        draw_solid(axes, np.empty((0, 4, 3)), "#3f8f5f", corners, np.array(corners).T)
-    assert [text.get_text() for text in axes.texts] == [NO_CELL]
+        for place, faces in enumerate((*quads, quads[0])):
+            axes = figure.add_subplot(1, 3, place + 1, projection="3d", computed_zorder=False)
+            draw_solid(axes, faces, "#3f8f5f", frame, np.array(frame).T)
+            words = [NO_CELL] if place == 1 else []
+            assert [text.get_text() for text in axes.texts] == words
+    assert figure_faults(figure) == []

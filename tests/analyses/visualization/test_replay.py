@@ -98,11 +98,8 @@ def moving_log(robot, rows):
         pose_row(pose_from_angles([0.1 * np.sin(t), 0.1 * np.cos(t), 0.3], np.zeros(3)))
         for t in times
     ]
-    return {
-        "time": times,
-        "X_WP": np.array(poses),
-        "tensions": 5.0 + np.sin(times[:, None] + np.arange(len(robot.cables))),
-    }
+    tensions = 5.0 + np.sin(times[:, None] + np.arange(len(robot.cables)))
+    return {"time": times, "X_WP": np.array(poses), "tensions": tensions}
 
 
 def test_a_replay_says_its_time_and_names_cables_tensions_and_lines(tmp_path):
