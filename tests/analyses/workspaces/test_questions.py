@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_recipe import recipe_case
+from cdpr_drake.analyses.workspaces.pose_grid import make_grid
 from cdpr_drake.analyses.workspaces.servo_stability import robot_stability, scenario_view
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.errors import BoundsFileError, CdprError
@@ -59,6 +60,14 @@ def test_a_robot_of_ones_own_gets_a_grid_in_its_frame(tmp_path):
     assert defaults.bounds == BASELINE
     grid = grid_by_step(defaults.lower, defaults.upper, defaults.step)
     assert grid.shape[1:] == (17, 17, 9)
+
+
+def test_a_box_has_as_many_points_as_the_default_grid():
+    robot = load_robot("acrobot_large")
+    box = np.array([-0.1, -0.2, 0.1]), np.array([0.1, 0.2, 0.3])
+    grid = make_grid(robot, robot, box=box)
+    assert grid.shape == make_grid(robot, robot).shape
+    np.testing.assert_allclose([grid.lower, grid.upper], box)
 
 
 def test_a_file_of_bounds_is_read_with_its_units(tmp_path):
