@@ -229,12 +229,12 @@ def load_grid(
     raise DataFileError(f"{path}: found no stored {noun}; accepted: {ARRAYS} of {command}")
 
 
-def reused(folder: Folder | None, follow: Follow) -> bool:
+def reused(folder: Folder, follow: Follow) -> bool:
     """True, and said, if an earlier call has finished the arrays of a folder."""
-    there = folder is not None and (folder.path / ARRAYS).is_file()
-    if there and folder is not None:
+    finished = (folder.path / ARRAYS).is_file()
+    if finished:
         follow.say(f"reused the grid of {shown_path(folder.path)}")
-    return there
+    return finished
 
 
 def grid_words(grid: WorkspaceGrid, robot: Robot | None, rule: str = "all") -> str:

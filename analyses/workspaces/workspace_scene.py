@@ -139,9 +139,9 @@ def _cuboids(middles: Array, halves: Array) -> Mesh:
     """Vertices, shape (8 k, 3), and triangles, shape (12 k, 3), of boxes."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    one = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
+    corners = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
     vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
-    faces = one + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
+    faces = corners + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
     return vertices, faces.reshape(-1, 3)
 
 
