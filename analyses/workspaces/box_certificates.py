@@ -111,11 +111,8 @@ def certified_boxes(
 ) -> CertifiedBoxes:
     """Boxes proven inside or outside; with a folder it goes on where it was stopped or killed.
 
-    Args:
-        search: What is to be proven, and where.
-        most_boxes: How many boxes are judged, at most; more of them continue a search for fewer.
-        folder: Where `JOURNAL` is kept; None: nowhere.
-        how: `on_progress` and `should_stop` of `workspaces.certify`.
+    At most so many boxes are judged; more of them continue a search for fewer. `how` has
+    `on_progress` and `should_stop` of `workspaces.certify`.
 
     Raises:
         WorkspaceError: most_boxes < 1.
@@ -135,13 +132,13 @@ def refined_boxes(
     the way were open before and are open now.
 
     Args:
-        boxes: Boxes of the whole region.
-        search: What is to be proven, and where.
+        boxes: Boxes of the whole region, which a search has found.
+        search: The search.
         way: Corners of the way, shape (n, 3) [m].
         reach: How far Po may be off it along each axis [m].
         most_boxes: How many more boxes are judged, at most.
-        folder: Where `REFINED_JOURNAL` is kept; None: nowhere.
-        how: `on_progress` and `should_stop` of `workspaces.refine`.
+        folder: As `certified_boxes`, like how.
+        how: As `certified_boxes`.
 
     Raises:
         WorkspaceError: A number is not accepted, or the way meets no box.

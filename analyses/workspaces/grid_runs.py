@@ -72,13 +72,13 @@ def run_grid(
     Args:
         work: Computes the arrays of some poses; it pickles.
         count: Number of poses.
-        chunk: Poses of a chunk: seconds of work at most.
-        folder: Where finished chunks are kept and read again; None: nowhere.
+        chunk: Poses of a chunk: seconds of work at most. Finished chunks are kept in the folder.
+        folder: The results folder; None: nothing is kept.
         workers: As `finished_jobs`.
         follow: Who follows.
 
     Raises:
-        StoppedError: It was stopped; finished chunks are kept.
+        StoppedError: It was stopped.
         CdprError: As the work.
         SweepError: The cluster cannot be used, or a process died.
     """
@@ -209,8 +209,8 @@ def load_grid(
     Args:
         path: The file, or its folder.
         needed: How the name of an array begins that files of this kind have.
-        noun: What it should be, for the message.
-        command: What writes such files, for the message.
+        noun: What it should be, and
+        command: what writes such files, for the message.
 
     Raises:
         DataFileError: There is no such file, or it is not of that kind.
@@ -229,12 +229,12 @@ def load_grid(
     raise DataFileError(f"{path}: found no stored {noun}; accepted: {ARRAYS} of {command}")
 
 
-def reused(folder: Folder | None, follow: Follow) -> bool:
+def reused(folder: Folder, follow: Follow) -> bool:
     """True, and said, if an earlier call has finished the arrays of a folder."""
-    there = folder is not None and (folder.path / ARRAYS).is_file()
-    if there and folder is not None:
+    finished = (folder.path / ARRAYS).is_file()
+    if finished:
         follow.say(f"reused the grid of {shown_path(folder.path)}")
-    return there
+    return finished
 
 
 def grid_words(grid: WorkspaceGrid, robot: Robot | None, rule: str = "all") -> str:
@@ -255,13 +255,8 @@ def _corners(lower: Array, upper: Array) -> str:
 def region_numbers(
     inside: np.ndarray, places: np.ndarray, axes: tuple[Array, Array, Array]
 ) -> dict[str, Any]:
-    """Counts and volumes of a region for JSON.
-
-    Args:
-        inside: Which poses belong to it, shape (k, nx, ny, nz).
-        places: Which positions do, shape (nx, ny, nz).
-        axes: Coordinates along x, y, z [m].
-    """
+    """Counts and volumes for JSON of a region: which poses of a grid belong to it, shape
+    (k, nx, ny, nz), and which positions, shape (nx, ny, nz)."""
     volumes = [workspace_volume(places, axes, rule) for rule in VolumeRule]
     unit = volumes[0].unit.replace("^", "").replace("-", "1")
     return {

@@ -100,7 +100,7 @@ def robot_stability(
         view: What the camera sees and shall see; None: as in the servoing thesis.
         scheme: One of `stability.SCHEMES`.
         verdict: One of `stability.verdict.VERDICTS`.
-        bounds: Perturbation bounds, or their file; None: those of the servoing thesis.
+        bounds: Perturbation bounds, or their file; None: the servoing thesis' bounds.
         options: How hard to look.
         printed_matrix: True to judge pbvs with the interaction matrix of the thesis' tables.
 

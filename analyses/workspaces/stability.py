@@ -18,6 +18,7 @@ from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
     Formats,
+    InputFile,
     Limits,
     OutFolder,
     RobotWord,
@@ -90,7 +91,6 @@ LEVERS_IN_WORDS = {
 }
 """What PBVS' interaction matrix has in its rotational columns, by `StabilityCase.lever`."""
 
-Bounds: TypeAlias = Annotated[Path | str | PerturbationBounds | None, words(Path, "a file", "FILE")]
 Variations: TypeAlias = Annotated[
     Any,
     words(named_numbers, "name=value,value,..., as in r_A=0.005,0.01", "NAME=VALUE,...", many=True),
@@ -227,7 +227,7 @@ def load_stability(path: Path | str) -> Stability:
 @verb()
 def assess_stability(
     robot: RobotWord, scheme: Annotated[str, one_of(SCHEMES)] = "pbvs",
-    verdict: Annotated[str, one_of(VERDICTS)] = "searched", *, bounds: Bounds = None,
+    verdict: Annotated[str, one_of(VERDICTS)] = "searched", *, bounds: InputFile = None,
     vary: Variations = None, grid: Grid = None, orientation: Orientations = (),
     scenario: ScenarioWord = None, printed_matrix: bool = False,
     draws: int = VerdictOptions.draws, seed: int = VerdictOptions.seed,

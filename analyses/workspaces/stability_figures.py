@@ -47,12 +47,8 @@ LINES: dict[str, dict[str, Any]] = {
 
 
 def planes_figure(stability: Stability, bounds: str | None = None) -> Figure:
-    """Planes of a grid, coloured by what holds there in every orientation.
-
-    Args:
-        stability: The result; with its robot, frame and exit points are drawn.
-        bounds: Name of the perturbation bounds; None: the first.
-    """
+    """Planes of a grid, coloured by what holds there in every orientation under some bounds, by
+    default the first."""
     parts = 2 * stability.places("Z", bounds) + stability.places("S", bounds)
     words = "Where the servo is stable and where the platform can be held"
     colors = {color: LABELS[key] for key, color in COLORS.items()}
@@ -65,12 +61,8 @@ def planes_figure(stability: Stability, bounds: str | None = None) -> Figure:
 def solids_figure(stability: Stability, bounds: str | None = None) -> Figure:
     """Z, S and SZ as solids in the robot's frame: the cells with all eight corners inside.
 
-    Args:
-        stability: The result, with its robot.
-        bounds: Name of the perturbation bounds; None: the first.
-
     Raises:
-        StabilityError: It was read from a file, which has no robot.
+        StabilityError: The result was read from a file, which has no robot.
     """
     robot = stability.robot
     if robot is None:

@@ -18,6 +18,7 @@ from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
     Box,
     Formats,
+    InputFile,
     Limits,
     OutFolder,
     RobotWord,
@@ -66,7 +67,6 @@ from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.tensions.methods import METHODS
-from cdpr_drake.workspaces.cable_interference import Obstacles
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.mesh_files import GRID_ENDINGS, MESH_ENDINGS, mesh_ending, write_hull
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
@@ -90,9 +90,6 @@ def _names(name: str | None, metavar: str) -> Parameter:
 Kinds: TypeAlias = Annotated[str | Sequence[str], _names("--kind", "KIND")]
 Measures: TypeAlias = Annotated[str | Sequence[str], _names("--measure", "MEASURE")]
 Reactions: TypeAlias = Annotated[Sequence[str] | None, _names(None, "REACTION")]
-ObstacleFile: TypeAlias = Annotated[
-    Path | str | Obstacles | Array | None, words(Path, "a file", "FILE")
-]
 WrenchSet: TypeAlias = Annotated[
     Path | str | SpatialSet | None, words(Path, "a file", "FILE", name="--wrench-set")
 ]
@@ -117,7 +114,7 @@ def compute_workspace(
     measures: Measures = (), orientation: Orientations = (),
     orientations: Annotated[str, one_of(RULES)] = "all", required: WrenchSet = None,
     force: float | None = None, moment: float | None = None, accelerations: Accelerations = None,
-    velocities: Velocities = None, clearance: float = 0.0, obstacles: ObstacleFile = None,
+    velocities: Velocities = None, clearance: float = 0.0, obstacles: InputFile = None,
     anchor_free: float | None = None, exit_free: float | None = None,
     scenario: ScenarioWord = None, hull: Vector = None, box: Box = None, unbounded: bool = False,
     pulleys: bool = True, method: Annotated[str | None, one_of(METHODS)] = None,

@@ -134,9 +134,6 @@ def breaks_figure(workspace: Workspace) -> Figure:
 
     Of several orientations the first one is drawn, and the title says so. It can be read without
     colours: hatching, numbers and symbols say all of it.
-
-    Args:
-        workspace: A result with the kind `dynamic-single-failure`.
     """
     about, turns = workspace.arguments["breaks"], len(workspace.grid.angles)
     arrays = [workspace.holds[SURVIVES], workspace.values[WORST], workspace.values[BEST]]
@@ -202,13 +199,8 @@ def _draw_break(
 
 
 def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
-    """Shares that are proven, and what is open, against the number of boxes.
-
-    Args:
-        boxes: The boxes.
-        robot: Name of the robot.
-        cables: How its cables run, in words; empty: nothing is said.
-    """
+    """Shares that are proven, and what is open, against the number of boxes, with the name of the
+    robot and how its cables run in the title."""
     words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
     figure, axes = new_figure(
         1, 1, (7.0, 4.6), "\n".join(words) + f"\n{boxes.open:.2%} of the box open"
@@ -228,12 +220,8 @@ def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
 def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
     """What is proven in three planes through the middle of the region that was cut.
 
-    Angles that vary are in the middle of their ranges.
-
-    Args:
-        boxes: The boxes.
-        robot: Name of the robot.
-        kinds: What was proven.
+    Angles that vary are in the middle of their ranges; the title has the robot's name and the kinds
+    that were proven.
     """
     lower, upper = boxes.poses - boxes.halves, boxes.poses + boxes.halves
     low, high = np.min(lower, axis=0), np.max(upper, axis=0)

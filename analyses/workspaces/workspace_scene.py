@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.colors import to_hex
 from pydrake.geometry import Rgba
 
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
@@ -140,9 +139,9 @@ def _cuboids(middles: Array, halves: Array) -> Mesh:
     """Vertices, shape (8 k, 3), and triangles, shape (12 k, 3), of boxes."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    one = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
+    corners = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
     vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
-    faces = one + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
+    faces = corners + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
     return vertices, faces.reshape(-1, 3)
 
 
@@ -150,6 +149,8 @@ def _page(
     robot: Robot, statics: Mapping[str, Any], title: str, solids: Sequence[tuple[str, Mesh, Rgba]]
 ) -> tuple[Pictures, str]:
     """The page, with the first solid visible; words if cables are grey, or if there is no page."""
+    from matplotlib.colors import to_hex  # half a second, which a scene needs not
+
     tensions, problem = _home_tensions(statics, robot)
     # Twice the largest tension is the end of the colours, which also tell home from full load.
     most = 0.0 if problem else 2.0 * float(np.max(tensions))
@@ -173,9 +174,7 @@ def _page(
 def _home_tensions(statics: Mapping[str, Any], robot: Robot) -> tuple[Array, str]:
     """Tensions of least 2-norm at home, shape (m,) [N]; NaN and the reason if there are none.
 
-    Args:
-        statics: Limits, mass and wrench as the arguments of a workspace have a `StaticCase`.
-        robot: The robot.
+    Limits, mass and wrench are those of a `StaticCase` among the arguments of a workspace.
     """
     X_WP = robot.home.transform()
     mass = statics["weight"] / robot.gravity if robot.gravity > 0.0 else None

@@ -97,7 +97,7 @@ def test_the_same_arguments_find_their_folder_again(capsys):
 PATIENCE = 1800.0
 """Time for what has no end of its own [s]; on a busy machine it may take minutes."""
 
-CHUNK, KEPT, POSES = 16, 3, 2 * 5 * 5 * 3
+CHUNK, KEPT, POSES = 16, 3, 5 * 5 * 3
 """Poses per chunk; chunks that are kept before the end; poses of a small sweep."""
 
 KILLED = killed_after(

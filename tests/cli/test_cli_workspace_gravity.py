@@ -89,14 +89,6 @@ def test_it_is_said_of_which_world_coordinates_are(tilted, capsys):
 
 
 @pytest.mark.usefixtures("without_pictures")
-def test_gravity_along_z_is_not_mentioned_where_nobody_asks(here, capsys):
-    asked = ("workspace", "planar", "--grid", "3,3,1", "--workers", "1", "--out", "found")
-    assert "axes" not in answer(capsys, *asked)
-    found = json.loads((here / "found" / "results.json").read_text())
-    assert found["axes"] == "those of W; the weight pulls along -z"
-
-
-@pytest.mark.usefixtures("without_pictures")
 def test_a_robot_of_grab_whose_frame_leans_by_a_degree(here, capsys):
     path = foreign_files.grab_on_board(here)
     text = path.read_text()
@@ -123,10 +115,12 @@ def test_a_level_plane_carries_what_of_the_weight_is_across_it(here, capsys):
     assert (code, "whose plane carries the weight" in err) == (2, True)
 
 
-def test_the_page_of_an_upright_robot_has_no_title(tilted):
+def test_of_an_upright_robot_axes_are_not_mentioned(tilted):
     """The title of the page is for what is out of the ordinary."""
     found = load_workspace(tilted[2])
     found.arguments["statics"]["down"] = [0.0, 0.0, -1.0]
+    assert "axes" not in repr(found)
+    assert found.as_dict()["axes"] == "those of W; the weight pulls along -z"
     pages, _ = workspace_page(found, small_robot("upright_body"))
     pages["workspace.html"](tilted[2] / "upright.html")
     assert "axes: " not in (tilted[2] / "upright.html").read_text(encoding="utf-8")

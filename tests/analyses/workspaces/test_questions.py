@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_recipe import recipe_case
+from cdpr_drake.analyses.workspaces.pose_grid import make_grid
 from cdpr_drake.analyses.workspaces.servo_stability import robot_stability, scenario_view
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.errors import BoundsFileError, CdprError
@@ -61,37 +62,41 @@ def test_a_robot_of_ones_own_gets_a_grid_in_its_frame(tmp_path):
     assert grid.shape[1:] == (17, 17, 9)
 
 
+def test_a_box_has_as_many_points_as_the_default_grid():
+    robot = load_robot("acrobot_large")
+    box = np.array([-0.1, -0.2, 0.1]), np.array([0.1, 0.2, 0.3])
+    grid = make_grid(robot, robot, box=box)
+    assert grid.shape == make_grid(robot, robot).shape
+    np.testing.assert_allclose([grid.lower, grid.upper], box)
+
+
 def test_a_file_of_bounds_is_read_with_its_units(tmp_path):
     path = tmp_path / "bounds.yaml"
     path.write_text("r_A: 0.01\nd_theta_bp_deg: 90\nexits: common\n")
     bounds = load_bounds(path)
-    assert bounds.r_A == 0.01
     assert bounds.d_theta_bp == pytest.approx(np.pi / 2)
-    assert (bounds.exits, bounds.anchors, bounds.r_bp) == ("common", "independent", 0.0)
+    assert (bounds.r_A, bounds.exits, bounds.anchors, bounds.r_bp) == (
+        0.01, "common", "independent", 0.0,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("words", "accepted"),
     [
-        ("r_A: -0.01\n", ["r_A", "-0.01", ">= 0 [m]"]),
-        ("d_theta_bp_deg: 200\n", ["d_theta_bp_deg", "200", "<= 180 [deg]"]),
-        ("d_theta_bp: 0.1\n", ["d_theta_bp", "did you mean d_theta_bp_deg?"]),
-        ("exits: all\n", ["exits", "independent, common, corners"]),
-        ("r_A: .nan\n", ["r_A"]),
+        ("r_A: -0.01\n", r"r_A.*-0\.01.*>= 0 \[m\]"),
+        ("d_theta_bp_deg: 200\n", r"d_theta_bp_deg.*200.*<= 180 \[deg\]"),
+        ("d_theta_bp: 0.1\n", r"d_theta_bp.*did you mean d_theta_bp_deg\?"),
+        ("exits: all\n", "exits.*independent, common, corners"),
+        ("r_A: .nan\n", "r_A"),
+        (None, "there is no such file"),
     ],
 )
 def test_bad_bounds_are_refused_with_file_field_and_range(tmp_path, words, accepted):
     path = tmp_path / "bounds.yaml"
-    path.write_text(words)
-    with pytest.raises(BoundsFileError) as refused:
+    if words is not None:
+        path.write_text(words)
+    with pytest.raises(BoundsFileError, match=f"bounds.yaml.*{accepted}"):
         load_bounds(path)
-    for word in ["bounds.yaml", *accepted]:
-        assert word in str(refused.value)
-
-
-def test_a_missing_file_of_bounds_is_named(tmp_path):
-    with pytest.raises(BoundsFileError, match="there is no such file"):
-        load_bounds(tmp_path / "nothing.yaml")
 
 
 ROUNDING = 1e-12

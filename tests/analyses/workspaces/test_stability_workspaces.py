@@ -111,11 +111,11 @@ def test_results_load_as_they_were_saved(found, tmp_path):
 
 
 def test_what_is_no_result_is_refused(tmp_path):
-    with pytest.raises(DataFileError, match="found no stored workspaces"):
-        load_stability(tmp_path)
-    (tmp_path / "workspace.npz").write_bytes(b"PK")
-    with pytest.raises(DataFileError, match="found no stored workspaces"):
-        load_stability(tmp_path)
+    for content in (None, b"PK"):
+        if content is not None:
+            (tmp_path / "workspace.npz").write_bytes(content)
+        with pytest.raises(DataFileError, match="found no stored workspaces"):
+            load_stability(tmp_path)
 
 
 def test_curves_have_the_values_of_the_bounds(found):

@@ -114,6 +114,8 @@ def test_a_workspace_as_hull_and_boxes_in_a_folder(tmp_path, monkeypatch, capsys
     assert {progress.unit for progress in seen} == {"rays", "poses", "boxes"}
     assert (found.failed, found.stopped, found.exit_code) == ({}, False, 0)
     assert "hull: " in repr(found)
+    assert numbers["certified"]["lower_m_rad"][:3] == BOX[0]
+    assert numbers["grid"]["upper_m"] == BOX[1]
     command = [
         "workspace", "acrobot_large", "--kind", "wrench-feasible", "--wrench-set", "push.yaml",
         "--grid", "3,3,3", "--box=-0.5:0.5,-0.5:0.5,0:1", "--hull", "0,0,0.3", "--rays", "100",
