@@ -140,56 +140,9 @@ def errors_figure(errors: dict[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-@dataclass(frozen=True, eq=False)
-class SlackPath:
-    """Cables along a path of poses.
-
-    Attributes:
-        share: Share of the path, shape (k,).
-        tensions: Shape (k, m) [N].
-        distances: From the wanted poses, shape (k,) [m].
-        names: Names of the cables.
-    """
-
-    share: Array
-    tensions: Array
-    distances: Array
-    names: list[str]
-
-    @property
-    def taut(self) -> np.typing.NDArray[np.bool_]:
-        """Which cables pull, shape (k, m)."""
-        return self.tensions > 0.0
-
-    @property
-    def most_six(self) -> float:
-        """Share of the path with at most six taut cables."""
-        return float(np.mean(np.sum(self.taut, axis=1) <= 6))
-
-    @property
-    def transfers(self) -> int:
-        """How often another set of six cables or fewer takes over."""
-        few = self.taut[np.sum(self.taut, axis=1) <= 6]
-        return int(np.sum(np.any(few[1:] != few[:-1], axis=1)))
-
-    def plot(self, title: str) -> Figure:
-        """Which cables are taut along the path, and how far the platform is from it."""
-        figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
-        for i, name in enumerate(self.names):
-            above.plot(
-                self.share, np.where(self.taut[:, i], float(i), np.nan), linewidth=6.0,
-                color=nth_look(i).color, linestyle=SOLID, solid_capstyle="butt",
-            )  # fmt: skip
-            above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
-            above.text(1.01, i, name, va="center")
-        rows = (len(self.names) - 0.5, -0.5)
-        above.set(ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=rows)
-        below.plot(self.share, 1e3 * self.distances)
-        below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
-        return figure
-
-
-def slack_along_path(robot: Robot, start: Array, end: Array, count: int, upset: Array) -> SlackPath:
+def slack_along_path(
+    robot: Robot, start: Array, end: Array, count: int, upset: Array
+) -> pd.DataFrame:
     """Rests an elastic robot along a straight path on lengths that are a little wrong.
 
     The controller believes in straight inextensible cables from fixed exit points; the robot's own
@@ -201,17 +154,38 @@ def slack_along_path(robot: Robot, start: Array, end: Array, count: int, upset: 
         end: Po where it ends, shape (3,) [m].
         count: Number of poses.
         upset: What the lengths err by at home, shape (m,) [m].
+
+    Returns:
+        A row for each pose, by its share of the path: tensions by the names of cables [N], and
+        `distance` from the wanted pose [m].
     """
     share = np.linspace(0.0, 1.0, count)
     poses = [pose_from_angles(start + s * (end - start), np.zeros(3)) for s in share]
     believed = Belief("", INEXTENSIBLE, robot.cable_set().without_pulleys())
     lengths = commanded_lengths(robot, believed, poses, upset)
     true, platform = robot.cable_set(), rigid_platform(robot)
-    tensions, distances, guess = [], [], poses[0]
+    rows, guess = [], poses[0]
     for X_WP, l0 in zip(poses, lengths, strict=True):
         rest = equilibrium_near(true, ELASTIC, platform, l0, guess)
         guess = rest.X_WP
-        tensions.append(rest.tensions)
-        distances.append(pose_error(rest.X_WP, X_WP)[0])
+        rows.append((*rest.tensions, pose_error(rest.X_WP, X_WP)[0]))
     names = [cable.name for cable in robot.cables]
-    return SlackPath(share, np.array(tensions), np.array(distances), names)
+    return pd.DataFrame(rows, index=share, columns=[*names, "distance"])
+
+
+def slack_figure(path: pd.DataFrame, title: str) -> Figure:
+    """Which cables are taut along a path, and how far the platform is from it."""
+    figure, (above, below) = new_figure(2, 1, (10.0, 7.0), title)
+    taut = path.drop(columns="distance") > 0.0
+    for i, name in enumerate(taut):
+        above.plot(
+            path.index, np.where(taut[name], float(i), np.nan), linewidth=6.0,
+            color=nth_look(i).color, linestyle=SOLID, solid_capstyle="butt",
+        )  # fmt: skip
+        above.axhline(i, color="0.8", linewidth=0.8, zorder=0)
+        above.text(1.01, i, name, va="center")
+    rows = (taut.shape[1] - 0.5, -0.5)
+    above.set(ylabel="taut cables [-]", yticks=[], xlim=(0.0, 1.0), ylim=rows)
+    below.plot(path.index, 1e3 * path["distance"])
+    below.set(xlabel="share of the path [-]", ylabel="distance from it [mm]", xlim=(0.0, 1.0))
+    return figure

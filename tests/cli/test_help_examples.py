@@ -34,7 +34,7 @@ LONG_WORK = {
         "cdpr_drake.analyses.planning.free_plan.solve_free_motion",
         "cdpr_drake.analyses.planning.proven_plan.ProvenSets.find",
     ],
-    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.reconfigured"],
+    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.results_folder"],
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],
     "calibrate": [
         "cdpr_drake.analyses.front.calibration.calibrate_log",

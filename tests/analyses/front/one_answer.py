@@ -194,7 +194,7 @@ def by_equilibria(robot, X_WP, pulleys):
     l0 = cdpr.solve_static(robot, X_WP, pulleys=pulleys).l0
     result = cdpr.find_equilibria(robot, l0, model="elastic", pulleys=pulleys, searches=2)
     there = [one for one in result.rests if max(pose_error(one.X_WP, X_WP)) < SAME_POSE]
-    return Answer(True if there else None, result.words, result.as_dict()["geometry"])
+    return Answer(True if there else None, result.lines()[0], result.as_dict()["geometry"])
 
 
 def by_studio(robot, X_WP, pulleys):

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.statics.modelling_errors import (
     pose_errors,
     poses_in,
     slack_along_path,
+    slack_figure,
     usual_beliefs,
     wrong_geometry,
 )
@@ -65,18 +66,20 @@ def test_lengths_are_right_at_home():
 def test_at_most_six_cables_stay_taut_and_slack_moves_along_a_path():
     """The reported effect: eight nearly inextensible cables, lengths wrong by a millimetre."""
     path = slack_along_path(ROBOT, START, END, 150, 1e-3 * np.random.default_rng(0).normal(size=8))
-    taut = np.sum(path.taut, axis=1)
-    assert path.most_six > 0.98
-    assert np.max(taut) <= 7
-    assert np.min(taut) == 4  # in between, gravity alone holds two motions
-    assert path.transfers >= 2
-    first, last = path.taut[0], path.taut[-1]
-    assert np.sum(first) == np.sum(last) == 6
-    assert np.sum(first != last) == 4  # two cables fell slack, two others came taut
-    assert 1e-3 < np.max(path.distances) < 1e-2
-    assert path.plot("title").axes[1].get_ylabel() == "distance from it [mm]"
+    taut = path.drop(columns="distance").to_numpy() > 0.0
+    count = np.sum(taut, axis=1)
+    few = taut[count <= 6]
+    assert len(few) > 0.98 * len(taut)
+    assert np.max(count) <= 7
+    assert np.min(count) == 4  # in between, gravity alone holds two motions
+    assert np.sum(np.any(few[1:] != few[:-1], axis=1)) >= 2  # another set of cables takes over
+    assert count[0] == count[-1] == 6
+    assert np.sum(taut[0] != taut[-1]) == 4  # two cables fell slack, two others came taut
+    assert 1e-3 < path["distance"].max() < 1e-2
+    assert slack_figure(path, "title").axes[1].get_ylabel() == "distance from it [mm]"
 
 
 def test_soft_cables_stay_taut_on_the_same_path():
     soft = replace(ROBOT, cable=replace(ROBOT.cable, youngs_modulus=1e-4 * 111e9))
-    assert np.all(slack_along_path(soft, START, END, 10, 1e-4 * np.arange(8.0)).taut)
+    path = slack_along_path(soft, START, END, 10, 1e-4 * np.arange(8.0))
+    assert (path.drop(columns="distance") > 0.0).all(axis=None)
