@@ -55,6 +55,11 @@ def accepted_names(found: object, known: Iterable[object]) -> str:
     return f"{hint}accepted: {', '.join(names)}"
 
 
+def install_words(extra: str) -> str:
+    """How an extra of this package is installed; the package itself comes from its sources."""
+    return f"in its sources: pip install '.[{extra}]'"
+
+
 class CdprError(Exception):
     """Base of all errors that a user can cause; the command line prints them and exits with 2."""
 

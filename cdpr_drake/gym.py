@@ -12,13 +12,13 @@ they are is said in `cdpr_drake.analyses.learning`, which is imported when one i
 
 from __future__ import annotations
 
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, install_words
 
 try:
     from gymnasium.envs.registration import register
 except ImportError as problem:
     raise CdprError(
-        "cdpr_drake.gym: the package gymnasium is not installed; pip install 'cdpr_drake[gym]'"
+        f"cdpr_drake.gym: the package gymnasium is not installed; {install_words('gym')}"
     ) from problem
 
 STEPS = {"Reach": 250, "Track": 250, "VisualServo": 250, "PickAndPlace": 500}

@@ -47,7 +47,7 @@ UNKNOWN = re.compile(r"unknown key|No such option|No such command|KeyError|is un
 LISTS = ("scenarios", "examples", "robots")
 """Commands that list how runs end, and run nothing."""
 
-EXTRA = re.compile(r"pip install 'cdpr_drake\[(\w+)\]'")
+EXTRA = re.compile(r"pip install '\.\[(\w+)\]'")
 """How messages name the extra that is missing."""
 
 SERVERS = ("studio",)

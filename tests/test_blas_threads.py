@@ -14,7 +14,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 import cdpr_drake as cdpr
 from cdpr_drake import blas_threads
 from cdpr_drake.analyses import tensions
-from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
+from cdpr_drake.analyses.frame.jobs import finished_jobs
 from tests.messages import messages
 
 NO_CALLS = ("Session", "TENSION_METHODS", "environment_names", "make_environment", "studies")
@@ -78,7 +78,7 @@ def test_every_verb_asks_for_one_thread_before_anything_else(verb, monkeypatch):
 def test_workers_have_one_thread_from_the_start(two_threads, monkeypatch):
     for name in blas_threads.ONE_THREAD:
         monkeypatch.setenv(name, "2")
-    assert [found for _, found in run_jobs(product, [0, 0], 2)] == 2 * [two_threads]
+    assert [job.result for job in finished_jobs(product, [0, 0], 2)] == 2 * [two_threads]
     assert os.environ["OPENBLAS_NUM_THREADS"] == "2"
 
 

@@ -100,7 +100,7 @@ def test_what_takes_hours_is_named_and_not_played(tmp_path):
 
 
 def test_a_step_that_names_an_extra_is_played_again_with_it(tmp_path, monkeypatch):
-    missing = "raise SystemExit(\"no zmq; pip install 'cdpr_drake[bridge]'\")\n"
+    missing = "raise SystemExit(\"no zmq; pip install '.[bridge]'\")\n"
     program = f"import os\nif not os.path.exists('has_it'):\n    {missing}"
     step = Step(page="page", words="programs of page", program=program)
     assert "no zmq" in Player(Path(sys.prefix), tmp_path / "as_it_is").play(step).problem

@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.blas_threads import one_blas_thread
-from cdpr_drake.errors import SweepError
+from cdpr_drake.errors import SweepError, install_words
 from cdpr_drake.kernel_cache.locks import share_compilation
 
 Job = TypeVar("Job")
@@ -300,8 +300,7 @@ def _connected(scheduler: str) -> Iterator[Any]:
         from distributed import Client
     except ImportError as problem:
         raise SweepError(
-            f"workers: found {scheduler}, and Dask is not installed; pip install "
-            "'cdpr_drake[cluster]'"
+            f"workers: found {scheduler}, and Dask is not installed; {install_words('cluster')}"
         ) from problem
     libraries = ("distributed", "asyncio", "tornado")  # loggers below them have levels, too
     names = [name for name in logging.root.manager.loggerDict if name.startswith(libraries)]

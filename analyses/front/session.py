@@ -113,8 +113,3 @@ def kept_folder(folder: Path | str, session: Session) -> Iterator[Path]:
     with continued_folder(Path(folder)) as results:
         session.opened(results)
         yield Path(folder)
-
-
-def asked_workers(workers: int | str | None) -> tuple[int | None, str | None]:
-    """Local processes, or the address of a Dask scheduler in their place."""
-    return (None, workers) if isinstance(workers, str) else (workers, None)

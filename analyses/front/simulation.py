@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.front.session import Say, Session, asked_workers
+from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, is_undrawn, write_pictures
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
 from cdpr_drake.analyses.reporting.log_files import log_columns
@@ -35,7 +35,6 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
 from cdpr_drake.analyses.simulation.monte_carlo_store import StoredRuns
 from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS, ScenarioKind
 from cdpr_drake.analyses.simulation.session import RunSession, check_connected
-from cdpr_drake.analyses.sweeps.workers import check_scheduler
 from cdpr_drake.analyses.visualization.figure_files import DEFAULT_FORMATS
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
@@ -255,9 +254,6 @@ def simulate(
     where = None if folder is None else Path(folder)
     if seeds is not None:
         _check(kind, loaded, "", told)
-        scheduler = asked_workers(workers)[1]
-        if scheduler is not None:
-            check_scheduler(scheduler)
         asked = _Asked(loaded, tuple(seeds), workers, note)
         if where is None:
             return _repeat(asked, None, wanted, told)
@@ -457,11 +453,10 @@ def _repeat(
     kept = None if results is None else StoredRuns(results.path, scenario)
     if asked.note:
         session.say(asked.note)
-    count, scheduler = asked_workers(asked.workers)
     with session.computing():
         runs = run_many(
-            with_seeds(scenario, list(asked.seeds)), count, session.progress, session.stop,
-            keep_traces=True, kept=kept, scheduler=scheduler,
+            with_seeds(scenario, list(asked.seeds)), asked.workers, session.progress, session.stop,
+            keep_traces=True, kept=kept, say=session.say,
         )  # fmt: skip
     if results is None:
         return RepeatedRuns(scenario, runs, repetition_summary(scenario, runs))

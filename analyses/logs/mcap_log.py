@@ -19,7 +19,7 @@ from cdpr_drake.analyses.logs.log_request import LogRequest
 from cdpr_drake.analyses.logs.recorded_log import POSITION, QUATERNION, TIME, RecordedLog
 from cdpr_drake.analyses.logs.text_tables import MOST_BYTES
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC, TIME_KEY
-from cdpr_drake.errors import LogFileError
+from cdpr_drake.errors import LogFileError, install_words
 from cdpr_drake.schema.json_text import load_json
 
 TRANSFORM = "foxglove.FrameTransform"
@@ -38,9 +38,7 @@ def read_mcap(path: Path, asked: LogRequest) -> RecordedLog:
         LogFileError: It cannot be read, has no messages in JSON, or channels of other times.
     """
     if find_spec("mcap") is None:
-        raise LogFileError(
-            f"{path}: needs mcap, which is not installed; pip install 'cdpr_drake[mcap]'"
-        )
+        raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
     if path.stat().st_size > MOST_BYTES:
         raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
     channels, poses, other = _messages(path)

@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import OutputFormatError
+from cdpr_drake.errors import OutputFormatError, install_words
 
 Columns = dict[str, Array]
 """Columns of a table by name, shape (n,) each; numbers or words."""
@@ -176,8 +176,7 @@ def _check_installed(name: str, where: str) -> None:
     package = _NEEDED.get(name)
     if package is not None and find_spec(package) is None:
         raise OutputFormatError(
-            f"{where}: {name} needs {package}, which is not installed; "
-            f"pip install 'cdpr_drake[{name}]'"
+            f"{where}: {name} needs {package}, which is not installed; {install_words(name)}"
         )
 
 

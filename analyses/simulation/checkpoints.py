@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.folder import differences
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, UNWRITTEN_CHECKPOINT
 from cdpr_drake.analyses.reporting.provenance import code_version, mechanism_arguments
 from cdpr_drake.analyses.reporting.written_files import claim
-from cdpr_drake.analyses.sweeps.folder import differences
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CheckpointError
 from cdpr_drake.models.robot_loader import load_robot

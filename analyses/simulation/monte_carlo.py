@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.job import ProcessDied
+from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord, StoredRuns
 from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.analyses.simulation.run_traces import run_traces
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.analyses.sweeps.worker_pool import run_jobs
-from cdpr_drake.analyses.sweeps.workers import run_jobs_on
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pose_accuracy import Repeatability, repeatability
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
@@ -98,13 +98,13 @@ class _Job:
 @inputs_read_once()
 def run_many(
     scenarios: Sequence[Scenario],
-    workers: int | None = None,
+    workers: int | str | None = None,
     on_progress: Callable[[WorkProgress], None] | None = None,
-    should_stop: Callable[[], bool] | None = None,
+    should_stop: Callable[[], bool] = lambda: False,
     *,
     keep_traces: bool = False,
     kept: StoredRuns | None = None,
-    scheduler: str | None = None,
+    say: Callable[[str], None] = lambda words: None,
 ) -> ManyRuns:
     """Simulates scenarios, each until its outcome is known or its duration is over.
 
@@ -114,19 +114,18 @@ def run_many(
 
     Args:
         scenarios: What to simulate; see `with_seeds`.
-        workers: Number of processes; None: one for each processor.
+        workers: Number of processes or address of a Dask scheduler, see `finished_jobs`.
         on_progress: Called after every run.
         should_stop: Asked all the time; after True no further run begins, those under way are
             finished and kept.
         keep_traces: Whether to keep the arrays that figures need.
         kept: Where finished runs of these scenarios are kept and found, with their traces if these
             are kept; None: nowhere.
-        scheduler: Address of a Dask scheduler, whose workers do the runs instead; one that gets
-            lost is made up for by the others.
+        say: Gets words on what a cluster lacks.
 
     Raises:
         CdprError: A scenario cannot be built: robot, camera or initial pose.
-        SweepError: The scheduler does not answer or got lost.
+        SweepError: As `finished_jobs`.
         OutputFolderError: A finished run cannot be written.
     """
     for scenario in {scenario.robot: scenario for scenario in scenarios}.values():
@@ -149,17 +148,14 @@ def run_many(
 
     if found:
         tell("found in the folder")
-    if scheduler is not None:
-        done = run_jobs_on(scheduler, _do, missing, should_stop)
-    else:
-        done = run_jobs(
-            _do,
-            missing,
-            workers,
-            should_stop,
-            on_lost=lambda index: lost.append(missing[index].scenario.seed),
-        )
-    for _, record in done:
+    for done in finished_jobs(_do, missing, workers, stop=should_stop, say=say, name="run"):
+        if isinstance(done.problem, ProcessDied):
+            lost.append(missing[done.number].scenario.seed)
+        elif done.problem is not None:
+            raise done.problem
+        if done.result is None:
+            continue
+        record = done.result
         if kept is not None:
             kept.store(record)
         records.append(record)

@@ -10,8 +10,8 @@ import shutil
 import signal
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -113,24 +113,59 @@ def _stop(problem: BaseException) -> NoReturn:
 def main(arguments: list[str] | None = None) -> None:
     """Runs the command; a `CdprError` becomes one line on stderr and exit code 2.
 
-    Without arguments it is the program of this process: SIGTERM ends it as Ctrl-C does, and both
-    end it at once when there is nothing left to do. Garbage is never searched for among what is
-    imported: that stays, and each search would walk through hundreds of thousands of objects.
+    Without arguments it is the program of this process, see `_own_process`.
     """
-    if arguments is not None:  # somebody else's process
-        held = one_blas_thread() if "numpy" in sys.modules else nullcontext()
-        with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
-            _main(arguments, lambda: None)
-        return
+    place = _own_process() if arguments is None else _process_of_others()
+    with place as begin, _problems_in_words():
+        command_line = sys.argv[1:] if arguments is None else arguments
+        exit_with_parent()
+        # A filter, as Drake sets the level itself when a subcommand imports it.
+        logging.getLogger("drake").addFilter(_is_error)
+        if not faulthandler.is_enabled():
+            with suppress(OSError, ValueError, RuntimeError):  # no stderr, or one that is no file
+                faulthandler.enable(sys.stderr)  # a crash of a library is never silent
+        encoding = sys.getfilesystemencoding()
+        if encoding != "utf-8":  # Drake does not start there
+            raise CdprError(f"found a locale with the encoding {encoding}; accepted: one with "
+                            "UTF-8, such as LC_ALL=C.UTF-8")  # fmt: skip
+        if tuple(command_line) in AT_ONCE:
+            print(AT_ONCE[tuple(command_line)]())
+            sys.exit(0)
+        compile_ahead(command_line)
+        share_compilation()
+        from cdpr_drake.cli.call import run  # and with it the parser
+
+        sys.exit(run(command_line, begin))
+
+
+@contextmanager
+def _own_process() -> Iterator[Callable[[], None]]:
+    """The process is this program's: SIGTERM ends it as Ctrl-C does.
+
+    Both end it at once before the subcommand runs and when there is nothing left to do. Garbage is
+    never searched for among what is imported: that stays, and each search would walk through
+    hundreds of thousands of objects.
+
+    Yields:
+        What is called when all is imported.
+    """
     begin_with_one_thread()
     for each in SIGNALS:
         signal.signal(each, _end_at_once)
     gc.disable()
     try:
-        _main(sys.argv[1:], _begin)
+        yield _begin
     finally:
         for each in SIGNALS:
             signal.signal(each, signal.SIG_DFL)
+
+
+@contextmanager
+def _process_of_others() -> Iterator[Callable[[], None]]:
+    """The process is somebody else's, and keeps its signals and threads."""
+    held = one_blas_thread() if "numpy" in sys.modules else nullcontext()
+    with held, started_with_one_thread():  # NumPy reads the environment when it is loaded
+        yield lambda: None
 
 
 def _end_at_once(number: int, frame: FrameType | None) -> None:
@@ -162,27 +197,11 @@ def _was_interrupted(problem: BaseException) -> bool:
     return cause is not None
 
 
-def _main(given: Sequence[str], imported: Callable[[], None]) -> NoReturn:
-    """Runs the command, and ends by SystemExit; `imported` is called before the verb is."""
-    exit_with_parent()
-    # A filter, as Drake sets the level itself when a subcommand imports it.
-    logging.getLogger("drake").addFilter(_is_error)
-    if not faulthandler.is_enabled():
-        with suppress(OSError, ValueError, RuntimeError):  # no stderr, or one that is no file
-            faulthandler.enable(sys.stderr)  # a crash of a library is never silent
-    encoding = sys.getfilesystemencoding()
-    if encoding != "utf-8":  # Drake does not start there
-        _refuse(f"found a locale with the encoding {encoding}; accepted: one with UTF-8, such as "
-                "LC_ALL=C.UTF-8")  # fmt: skip
-    if tuple(given) in AT_ONCE:
-        print(AT_ONCE[tuple(given)]())
-        sys.exit(0)
+@contextmanager
+def _problems_in_words() -> Iterator[None]:
+    """What is refused or stopped inside the block ends the program, in a line on stderr."""
     try:
-        compile_ahead(given)
-        share_compilation()
-        from cdpr_drake.cli.call import run  # and with it the parser
-
-        sys.exit(run(given, imported))
+        yield
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")

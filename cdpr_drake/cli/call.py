@@ -28,7 +28,7 @@ from cyclopts import (
 )
 
 from cdpr_drake.cli.commands import COMMANDS, Command
-from cdpr_drake.cli.option_names import named_options, with_options
+from cdpr_drake.cli.option_names import COMMAND_WORDS, named_options, with_options
 from cdpr_drake.cli.process import INCOMPLETE
 from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.schema.input_files import inputs_read_once
@@ -41,13 +41,6 @@ PICTURES = ("png", "pdf", "svg", "jpg", "jpeg", "tif", "tiff", "webp", "eps", "p
 
 KINDS = {int: "a whole number", float: "a number", bool: "true or false"}
 """What words of an option have to be, by the type of its argument."""
-
-LOADERS = {
-    "cdpr_drake.models.load_robot": "a command that takes one, such as cdpr tension or cdpr view",
-    "cdpr_drake.models.load_mechanism": "a command that takes one, such as cdpr static",
-    "cdpr_drake.systems.load_scenario": "a command that takes one, such as cdpr simulate",
-}  # fmt: skip
-"""Commands in the place of functions that messages name for files of another kind."""
 
 COMPLETION = "completion"
 """The subcommand that lets the Tab key complete."""
@@ -168,7 +161,7 @@ def parsed(command_line: Sequence[str]) -> Call | None:
         words = f"found {name!r}; {accepted_names(name, COMMANDS)}" if name else "found none"
         raise CdprError(f"command: {words}; see cdpr --help")
     app = make_app(command_line)
-    options, switches = dict(LOADERS), set[str]()
+    options, switches = dict(COMMAND_WORDS), set[str]()
     if name != COMPLETION:
         options |= options_of(resolve_name(_verb_of(COMMANDS[name], command_line)))
         switches = {f"--{form}" for form in COMMANDS[name].forms} - set(options.values())
@@ -317,7 +310,9 @@ def _usage_words(problem: CycloptsError, command_line: Sequence[str]) -> str:
         words = f"{problem.token.keyword or problem.token.value}: found {owner[0]}; accepted: "
         words += owner[1]
     elif isinstance(problem, UnusedCliTokensError):
-        words = f"found {' '.join(problem.unused_tokens or ())!r}; accepted: fewer words"
+        forms = _forms_in(COMMANDS[name], command_line) if name else []
+        form = "".join(f" with --{form}" for form in forms)
+        words = f"found {' '.join(problem.unused_tokens or ())!r}{form}; accepted: fewer words"
     elif isinstance(problem, MissingArgumentError) and problem.argument is not None:
         option, info = problem.argument.name, problem.argument.field_info
         only_place = problem.argument.names == (f"--{info.name}",)  # it has no other name

@@ -8,17 +8,15 @@ from contextlib import contextmanager
 
 from cdpr_drake.errors import CdprError
 
-SHARED_OPTIONS = {
-    "overwrite": "--overwrite",
-    "runs_from": "--runs-from",
-    "overrides": "--set",
-    "workers": "--scheduler",
+COMMAND_WORDS = {
+    "cdpr_drake.models.load_robot": "a command that takes one, such as cdpr tension or cdpr view",
+    "cdpr_drake.models.load_mechanism": "a command that takes one, such as cdpr static",
+    "cdpr_drake.systems.load_scenario": "a command that takes one, such as cdpr simulate",
     "camera.kind=projected": "--camera projected",
     "finish_run": "cdpr simulate --finish",
     "continue_run": "cdpr simulate --continue",
-}
-"""Options by the arguments that mean the same in every command; of `workers` the library refuses
-addresses of schedulers alone."""
+}  # fmt: skip
+"""Commands and options in the place of functions and settings that messages name."""
 
 BEFORE = ("add", "allow", "found", "leave out", "needs", "use", "with", "without")
 """Words of a message after which an argument is named."""

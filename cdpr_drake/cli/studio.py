@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.words import OpenedWord, whole
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, install_words
 
 if TYPE_CHECKING:
     from cdpr_drake.studio.workbench.command_form import CommandForm
@@ -36,7 +36,7 @@ def studio(
     The printed address contains a token, new at each start, that every request needs. The
     environment variable CDPR_STUDIO_TOKEN sets the token, which is then not printed.
 
-    Needs the extra `studio`: pip install 'cdpr_drake[studio]'.
+    Needs the extra `studio`: in its sources, pip install '.[studio]'.
 
     Args:
         opened: Robot or scenario by name, or the path of a file, also of another tool.
@@ -51,7 +51,7 @@ def studio(
     """
     token = _wanted_token(no_token)
     if find_spec("nicegui") is None:
-        raise CdprError("cdpr studio needs NiceGUI; pip install 'cdpr_drake[studio]'")
+        raise CdprError(f"cdpr studio needs NiceGUI; {install_words('studio')}")
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
     from cdpr_drake.studio.server import StudioOptions, serve
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import RobotFileError, install_words
 from cdpr_drake.models.formats.draft import RobotDraft
 from cdpr_drake.models.formats.reading import fail, read_xml
 from cdpr_drake.models.formats.unread import mark, mark_below, watched
@@ -80,7 +80,7 @@ def compiled_model(path: Path) -> tuple[Compiled, ET.Element, list[str]]:
         import mujoco
     except ImportError as problem:
         raise RobotFileError(
-            f"{path}: MJCF is read by MuJoCo, which is not installed; pip install cdpr_drake[mjcf]"
+            f"{path}: MJCF is read by MuJoCo, which is not installed; {install_words('mjcf')}"
         ) from problem
     remarks: list[str] = []
     try:

@@ -7,4 +7,3 @@ poses = [cdpr.Pose(position=p) for p in ([0.0, 0.0, 0.3], [0.15, 0.0, 0.35], [0.
 plan = cdpr.plan_path(robot, poses, speed=0.5, stations=200, track=True)
 print(plan)
 plan.plot().savefig("plan.png")
-print(plan.tracked)

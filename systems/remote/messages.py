@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import BridgeError
+from cdpr_drake.errors import BridgeError, install_words
 from cdpr_drake.schema.json_text import load_json
 
 PROTOCOL = 1
@@ -43,7 +43,7 @@ def check_available() -> None:
     except ImportError as problem:
         raise BridgeError(
             f"the bridge: found no package {problem.name}; accepted: pyzmq and msgpack installed, "
-            "pip install 'cdpr_drake[bridge]'"
+            f"{install_words('bridge')}"
         ) from problem
 
 

@@ -24,7 +24,7 @@ from pydrake.geometry import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import SensorError
+from cdpr_drake.errors import SensorError, install_words
 from cdpr_drake.geometry import ray_shapes
 from cdpr_drake.geometry.triangle_meshes import fan_triangles, obj_triangles
 
@@ -136,7 +136,7 @@ def _foreign_triangles(source: Any, where: str) -> Array:
     except ImportError:
         raise SensorError(
             f"{where}: its mesh is a {source.extension()} file, which range sensors read by "
-            'trimesh, found none; pip install "cdpr_drake[mesh]", or use an .obj file'
+            f"trimesh, found none; {install_words('mesh')}, or use an .obj file"
         ) from None
     if not source.is_path():
         raise SensorError(

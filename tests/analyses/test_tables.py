@@ -25,7 +25,7 @@ def test_a_workspace_has_a_row_a_pose(workspace):
 
 
 def test_stability_has_a_row_a_pose():
-    found = cdpr.assess_stability("planar", "pbvs", "sampled", grid=(2, 2, 1), options={"draws": 5})
+    found = cdpr.assess_stability("planar", "pbvs", "sampled", grid=(2, 2, 1), draws=5)
     frame = found.to_dataframe()
     assert len(frame) == 4
     assert list(frame[f"Z {found.names[0]}"]) == list(found.stable[0].ravel())

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from cdpr_drake.analyses.planning import path_plan
+from cdpr_drake.analyses import tensions
 from cdpr_drake.cli.app import main
 from tests.messages import messages, printed
 
@@ -45,7 +45,6 @@ from cdpr_drake.cli.app import main
 main()
 """
 
-PLAN = "plan acrobot_large --waypoints 0,0,0.2;0.1,-0.1,0.3 --limits 1,60 --out out"
 STOPPED = (130, "cdpr: stopped\n")
 NUMBERS = pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 
@@ -76,13 +75,13 @@ def test_ctrl_c_when_all_is_done_says_nothing(here):
 
 
 @pytest.fixture
-def plan(here, monkeypatch, capsys):
-    """Calls the program of the process, here, with something else in the place of a plan."""
+def tension(here, monkeypatch, capsys):
+    """Calls the program of the process, here, with something else in the place of a problem."""
     handlers = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
 
     def call(instead):
-        monkeypatch.setattr(path_plan, "plan_along_path", instead)
-        monkeypatch.setattr(sys, "argv", ["cdpr", *PLAN.split()])
+        monkeypatch.setattr(tensions, "wrench_balance", instead)
+        monkeypatch.setattr(sys, "argv", ["cdpr", "tension", "acrobot_large"])
         with pytest.raises(SystemExit) as end:
             main()
         assert not any(here.iterdir())
@@ -95,30 +94,30 @@ def plan(here, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("kind", [ImportError, RuntimeError, SystemError, KeyError, TypeError])
-def test_what_wraps_a_ctrl_c_counts_as_one(plan, kind):
+def test_what_wraps_a_ctrl_c_counts_as_one(tension, kind):
     """As compilers and Drake's compiled modules do, and Python where a class is just made."""
 
-    def wraps(*_):
+    def wraps(*_, **__):
         try:
             raise KeyboardInterrupt
         except KeyboardInterrupt as problem:
             raise kind("initialization failed") from problem
 
-    assert plan(wraps) == STOPPED
+    assert tension(wraps) == STOPPED
 
 
 @NUMBERS
-def test_a_signal_while_a_class_is_made_leaves_no_traceback(plan, number):
+def test_a_signal_while_a_class_is_made_leaves_no_traceback(tension, number):
     """Python makes a RuntimeError of it: Error calling __set_name__."""
 
     class Late:
         def __set_name__(self, owner, name):
             signal.raise_signal(number)
 
-    assert plan(lambda *_: type("Made", (), {"late": Late()})) == STOPPED
+    assert tension(lambda *_, **__: type("Made", (), {"late": Late()})) == STOPPED
 
 
 @NUMBERS
-def test_a_command_that_keeps_nothing_leaves_nothing(plan, number):
-    code, said = plan(lambda *_: signal.raise_signal(number))
+def test_a_command_that_keeps_nothing_leaves_nothing(tension, number):
+    code, said = tension(lambda *_, **__: signal.raise_signal(number))
     assert (code, said.splitlines()[-1]) == (130, "cdpr: stopped")

@@ -19,7 +19,7 @@ from cdpr_drake.tensions.methods import METHODS
 from tests.cli.commands import refuse, run, told
 from tests.systems.pick_and_place.test_pick_and_place import SHORT
 
-LONG = 65
+LONG = 70
 """Lines that an example has at most, so that it is read in a minute."""
 
 TABLES = (METHODS, SCHEMES, ESTIMATORS)
@@ -69,7 +69,7 @@ def is_proven_and_hardly_longer(out):
 
 
 def says_what_is_proven(out):
-    return len(numbers(r"proven +[a-z-]+ ([\d.]+) to ([\d.]+)", out)) == 2
+    return len(numbers(r"(?:wrench-feasible|csw) +([\d.]+) +([\d.]+) +(?:m\^3|share)", out)) == 2
 
 
 def leaves_less_swing(out):
@@ -80,7 +80,7 @@ def leaves_less_swing(out):
 
 
 def is_heavier_saved_and_asked(out):
-    share = numbers(r"static +([\d.]+) % of the poses", out)[0, 0]
+    share = numbers(r" static +([\d.]+) ", out)[0, 0]
     there = Path("mine.yaml").is_file() and Path("mine_workspace.png").stat().st_size > 0
     return "Robot mine" in out and "1 kg, box" in out and 0.0 < share <= 100.0 and there
 
@@ -90,12 +90,11 @@ def both_schemes_arrive(out):
 
 
 def is_known_by_name(out):
-    rows = numbers(r"tensions \[N\] +([\d.]+)", out)
-    return "tensions by least_norm: feasible" in out and len(rows) == 2
+    return len(numbers(r"(?:least_norm|barycenter) +feasible +([\d.]+)", out)) == 2
 
 
 def is_tracked(out):
-    return "all kept; steps without tensions: 0" in out and Path("plan.png").is_file()
+    return "all limits kept; steps without tensions: 0" in out and Path("plan.png").is_file()
 
 
 def is_closed_for_two_seconds(out):
@@ -218,13 +217,13 @@ def test_they_are_listed_and_copied_and_nothing_is_overwritten(capsys, here):
     assert copied.read_text() == "mine"
 
 
-def test_groups_have_every_subcommand_once_with_two_examples_of_itself():
+def test_groups_have_every_subcommand_once_with_examples_of_itself():
     groups = [command.group for command in COMMANDS.values()]
     assert groups == sorted(groups, key=groups.index)  # groups are not torn apart
     examples = [line for command in COMMANDS.values() for line in command.examples]
-    assert len(set(examples)) == 2 * len(COMMANDS)
+    assert len(set(examples)) == len(examples)
     for name, command in COMMANDS.items():
-        assert len(command.examples) == 2
+        assert len(command.examples) >= 2
         assert all(line.split()[:2] == ["cdpr", name] for line in command.examples)
 
 

@@ -30,6 +30,7 @@ LONG_WORK = {
     "workspace": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
     "stability": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
     "plan": [
+        "cdpr_drake.analyses.planning.path_plan.plan_along_path",
         "cdpr_drake.analyses.planning.free_plan.solve_free_motion",
         "cdpr_drake.analyses.planning.proven_plan.ProvenSets.find",
     ],

@@ -12,6 +12,7 @@ from cdpr_drake.analyses.simulation.live_messages import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.workspaces.workspace import compute_workspace
+from cdpr_drake.cli.call import parsed
 from cdpr_drake.cli.option_names import with_options
 from cdpr_drake.cli.simulate import PYTHON_NAMES
 from cdpr_drake.errors import CdprError
@@ -66,7 +67,7 @@ NOWHERE = "192.0.2.1"
 def test_python_reads_arguments_and_the_command_options(
     call, arguments, python, command, here, monkeypatch, capsys
 ):
-    monkeypatch.setattr("cdpr_drake.analyses.sweeps.workers.SCHEDULER_TIMEOUT", 0.3)
+    monkeypatch.setattr("cdpr_drake.analyses.frame.cluster.SCHEDULER_TIMEOUT", 0.3)
     (here / "there").mkdir()
     (here / "there" / "notes.txt").touch()
     with pytest.raises(CdprError) as refused:
@@ -117,3 +118,9 @@ def test_functions_become_commands():
     assert with_options("or use camera.kind=projected", PYTHON_NAMES) == (
         "or use --camera projected"
     )
+
+
+def test_commands_stand_in_the_place_of_functions():
+    options = parsed(["simulate", "acrobot_pbvs"]).options
+    said = with_options("log.npz: found an end; finish_run makes results of it", options)
+    assert said == "log.npz: found an end; cdpr simulate --finish makes results of it"

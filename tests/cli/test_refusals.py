@@ -246,7 +246,6 @@ REFUSED = {
         ("--orientation 0,0", "--orientation"),
         ("--orientation 0,0,0:360:0.001", "--orientation", "10000"),
         ("--mass 0", "--mass"),
-        ("--workers 2", "--workers", "multiple times"),
     ],
     "workspace planar": [
         ("--box 5:6,0:1,0:1 --grid 3,3,1", "grid", "frame of planar"),
@@ -359,8 +358,7 @@ def held(root):
 @pytest.mark.parametrize(("line", "words"), ROWS, ids=[line[:70] for line, _ in ROWS])
 def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    for module in ("analyses.sweeps.workers", "analyses.frame.cluster"):
-        monkeypatch.setattr(f"cdpr_drake.{module}.SCHEDULER_TIMEOUT", 0.3)
+    monkeypatch.setattr("cdpr_drake.analyses.frame.cluster.SCHEDULER_TIMEOUT", 0.3)
     before = held(folder)
     said = refuse(capsys, *shlex.split(line))
     for word in words:
@@ -423,7 +421,7 @@ def test_a_renderer_or_a_format_that_is_not_installed_is_said_first(here, monkey
     assert "--camera projected" in said
     monkeypatch.setattr("cdpr_drake.analyses.reporting.exported_logs.find_spec", lambda name: None)
     said = refuse(capsys, "simulate", *QUICK.split(), "--log-format", "mat,parquet")
-    assert "pip install 'cdpr_drake[parquet]'" in said
+    assert "pip install '.[parquet]'" in said
     assert not any(here.iterdir())
 
 

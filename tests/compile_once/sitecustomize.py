@@ -61,7 +61,7 @@ def stay(module):
 
 CHANGES = {
     "numba.core.dispatcher": share,
-    "cdpr_drake.analyses.sweeps.worker_pool": stay,
+    "cdpr_drake.analyses.frame.jobs": stay,
 }
 """Modules, and what is done to them once they are imported."""
 

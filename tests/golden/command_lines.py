@@ -52,7 +52,7 @@ TENSION = {
     ),
     "tension-mechanism-held": "tension arm_on_platform --held none",
     "tension-mechanism-platforms": "tension two_platforms --method closed_form --no-pulleys",
-    "tension-plot": "tension acrobot_large --method all --plot a.png --wrench-set-plot b.png",
+    "tension-plot": "tension acrobot_large --method all --plot polygon=a.png --plot wrenches=b.png",
     "tension-refused-robot": "tension no_such_robot",
     "tension-refused-method": "tension acrobot_large --method guess",
     "tension-refused-both": "tension acrobot_large --wrench 0,0,0,1,0,0 --force 1,0,0",
@@ -74,7 +74,7 @@ STATIC = {
     "static-underactuated": "static grab_three --lengths 1.8,1.9,1.8",
     "static-planar": "static planar --pose 0.05,0.05,0.3",
     "static-point": "static maslow_4",
-    "static-behaviour": "static own.yaml --pose 0.2,0.1,1.2 --plot-behaviour a.png",
+    "static-behaviour": "static own.yaml --pose 0.2,0.1,1.2 --plot behaviour=a.png",
     "static-behaviour-no-pulleys": "static own.yaml --no-pulleys",
     "static-rails": f"{RAILS} {NEAR} --out moved && static moved/robot.yaml@C1=0.1,C3=-0.05",
     "static-mechanism": "static cable_arm",
@@ -176,7 +176,8 @@ WORKSPACE = {
     ),
     "workspace-method": f"{LARGE} --method closed_form --grid 5,5,3 {GRID}",
     "workspace-load": (
-        f"{LARGE} --limits 2,40 --mass 4.5 --wrench 0,0,0,3,0,0 --grid 5,5,3 --format svg {GRID}"
+        f"{LARGE} --limits 2,40 --mass 4.5 --wrench 0,0,0,3,0,0 --grid 5,5,3 "
+        f"--figure-format svg {GRID}"
     ),
     "workspace-no-pulleys": f"workspace caroca --no-pulleys --grid 5,5,3 {GRID}",
     "workspace-refused-kind": f"{LARGE} --kind nice {GRID}",

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.frame.folder import LOCK
+
 NOT_RESULTS = {
     r"(^|/)versions(/|$)": "versions of packages",
     r"(^|/)cdpr_drake$": "version and hash of the sources",
@@ -123,5 +125,6 @@ def read_results(folder: Path, texts: bool = False) -> dict[str, Any]:
             kept[file.name] = digests(file)
         elif texts:
             kept[file.name] = strip(file.read_text(encoding="utf-8").splitlines())
-    kept["files"] = sorted(file.name for file in folder.iterdir() if file.is_file())
+    files = {file.name for file in folder.iterdir() if file.is_file()} - {LOCK}
+    kept["files"] = sorted(files)
     return kept

@@ -13,7 +13,7 @@ import pytest
 from numba.core import event
 from numba.core.dispatcher import Dispatcher
 
-from cdpr_drake.analyses.sweeps.worker_pool import default_workers
+from cdpr_drake.analyses.frame.jobs import default_workers
 from cdpr_drake.errors import CdprError
 from cdpr_drake.kernel_cache import background
 from cdpr_drake.kernel_cache import locks as locks_module

@@ -34,7 +34,7 @@ def axe_file() -> Path:
         return Path(os.environ["AXE_FILE"])
     found = importlib.util.find_spec("axe_core_python")
     if found is None or found.origin is None:
-        pytest.skip("axe-core-python is not installed (pip install 'cdpr_drake[test]')")
+        pytest.skip("axe-core-python is not installed (pip install '.[test]')")
     return Path(found.origin).with_name("axe.min.js")
 
 

@@ -76,7 +76,9 @@ def log_contents(path: Path) -> LogContents:
     log = found.log
     picture = io.BytesIO()
     found.plot().savefig(picture, format="png", dpi=DOTS)
-    title, facts = found.summary()
+    title, facts = log.summary()
+    if found.joined is not None:
+        facts = [("clocks", found.joined.words()), *facts]
     told = dict(facts) | {"columns": f"{len(log.columns)}, in the table below"}
     notes = [words for what, words in facts if what == "note"]
     told.pop("note", None)

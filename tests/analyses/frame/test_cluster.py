@@ -13,8 +13,10 @@ import pytest
 from cdpr_drake.analyses.frame import cluster as module
 from cdpr_drake.analyses.frame.job import ProcessDied
 from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
 from cdpr_drake.errors import SweepError
 from cdpr_drake.schema.input_files import input_text, inputs_read_once
+from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.frame.test_jobs import read, square
 from tests.messages import printed
 
@@ -118,6 +120,25 @@ def test_workers_with_other_code_are_refused_by_name(local, monkeypatch):
     with pytest.raises(SweepError, match=r"no worker can do the jobs\. tcp://.*accepted: 0\.0 of"):
         list(finished_jobs(square, range(3), local.scheduler_address, say=lines.append))
     assert any("is not used: it has cdpr_drake" in line for line in lines)
+
+
+def test_runs_over_seeds_are_those_of_this_machine_though_a_worker_dies(local, workers):
+    changes = ["camera.kind=projected", "duration=0.1", "integration.loop=compiled"]
+    scenarios = with_seeds(load_scenario("acrobot_pbvs", changes), range(6))
+    here = run_many(scenarios, 1, keep_traces=True)
+
+    def kill_one(progress):
+        if progress.done == 1:
+            os.kill(workers[0], signal.SIGKILL)
+
+    there = run_many(scenarios, local.scheduler_address, kill_one, keep_traces=True)
+    assert [record.seed for record in there.records] == list(range(6))
+    for one, other in zip(here.records, there.records, strict=True):
+        assert one.end.tobytes() == other.end.tobytes()
+        assert one.traces.keys() == other.traces.keys()
+        assert all(
+            one.traces[name].tobytes() == other.traces[name].tobytes() for name in one.traces
+        )
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+import re
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -26,7 +27,7 @@ def shows_itself(result):
     if isinstance(result, Result):
         assert as_json(result)
         assert isinstance(result.plot(), Figure)
-        assert "<table>" in result._repr_html_()
+        assert re.search("<(table|p)>", result._repr_html_())
         assert " object at 0x" not in repr(result)
         return repr(result)
     if type(result) in RESULTS:

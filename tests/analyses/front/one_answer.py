@@ -171,9 +171,8 @@ def by_workspace(robot, X_WP, pulleys):
 
 def by_stability(robot, X_WP, pulleys):
     result = cdpr.assess_stability(
-        robot, verdict="sampled", grid=grid_at(X_WP), pulleys=pulleys,
-        options={"draws": 1},
-    )  # fmt: skip
+        robot, verdict="sampled", grid=grid_at(X_WP), pulleys=pulleys, draws=1
+    )
     return Answer(bool(result.inside("S").all()), "", result.as_dict()["geometry"])
 
 

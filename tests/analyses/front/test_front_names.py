@@ -36,7 +36,7 @@ def test_all_results_tell_draw_and_show_themselves():
     assert RESULTS
     for kind in RESULTS:
         assert issubclass(kind, Summarized | Result), kind
-        assert not inspect.isabstract(kind), kind
+        assert not inspect.isabstract(kind) or kind.__subclasses__(), kind
         for method in ("as_dict", "plot"):
             assert inspect.isfunction(getattr(kind, method, None)), f"{kind}: {method}"
 

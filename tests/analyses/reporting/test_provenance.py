@@ -1,14 +1,8 @@
 """What results say of the code that computed them."""
 
-import errno
 import re
 
-import numpy as np
-import pytest
-
 from cdpr_drake.analyses.reporting.provenance import code_version, hash_of_sources
-from cdpr_drake.analyses.sweeps import folder as sweep_folder
-from cdpr_drake.errors import OutputFolderError
 
 
 def test_the_code_has_a_version_and_a_hash():
@@ -37,15 +31,3 @@ def test_the_hash_changes_with_sources_alone_and_not_with_their_place(tmp_path):
         (here / name).write_text(old)
     (here / "a.py").rename(here / "c.py")
     assert hash_of_sources([here], [here / "cli"]) != before
-
-
-def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
-    def full(path, arrays):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    folder = sweep_folder.SweepFolder(tmp_path / "sweep", {"seed": 1})
-    monkeypatch.setattr(sweep_folder, "store_arrays", full)
-    with pytest.raises(OutputFolderError, match=r"sweep: cannot be written: No space left.*kept"):
-        folder.store("a", 0, 1, {"x": np.zeros(1)})
-    with pytest.raises(OutputFolderError, match="No space left"):
-        folder.finish({"a": {"x": np.zeros(1)}})

@@ -11,7 +11,7 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.sweeps.worker_pool import with_inputs
+from cdpr_drake.analyses.frame.jobs import with_inputs
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.models.mechanism_loader import load_mechanism

@@ -1,7 +1,9 @@
 """Repeated runs: the same whoever does them, kept when stopped; what they leave, by hand."""
 
 import csv
+import errno
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,9 +22,9 @@ from cdpr_drake.analyses.simulation.monte_carlo_report import (
     statistics,
     write_repetitions,
 )
-from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord
+from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord, StoredRuns
 from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.errors import InfeasibleTensionError, OutputFormatError
+from cdpr_drake.errors import InfeasibleTensionError, OutputFolderError, OutputFormatError
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -99,6 +101,45 @@ def test_a_scenario_that_cannot_be_built_is_an_error():
     high = load_scenario("acrobot_pbvs", [*SHORT, "initial_pose.position=[0, 0, 1.1]"])
     with pytest.raises(InfeasibleTensionError, match="cannot hold the platform"):
         run_many([high], workers=1)
+
+
+def test_runs_are_kept_by_their_seeds_and_a_damaged_one_is_missing(scenario, runs, tmp_path):
+    for record in runs.records:
+        StoredRuns(tmp_path / "out", scenario).store(record)
+    again = StoredRuns(tmp_path / "out", replace(scenario, seed=5))
+    for index, record in enumerate(runs.records):
+        stored = again.load(index, record.seed)
+        assert (stored.index, stored.seed, stored.summary) == (index, record.seed, record.summary)
+        np.testing.assert_array_equal(stored.end, record.end)
+        assert stored.traces.keys() == record.traces.keys()
+        for name, values in record.traces.items():
+            np.testing.assert_array_equal(stored.traces[name], values)
+    file = tmp_path / "out" / "chunks" / "seed-0.npz"
+    file.write_bytes(file.read_bytes()[:100])
+    assert again.load(0, 0) is None
+    assert again.load(0, 1) is None
+
+
+def test_other_folders_are_refused_and_left_alone(scenario, runs, tmp_path, monkeypatch):
+    (tmp_path / "thesis.txt").write_text("x")
+    with pytest.raises(OutputFolderError, match="holds files already"):
+        StoredRuns(tmp_path, scenario)
+    with pytest.raises(OutputFolderError, match="found a file"):
+        StoredRuns(tmp_path / "thesis.txt", scenario)
+    assert os.listdir(tmp_path) == ["thesis.txt"]
+    folder = StoredRuns(tmp_path / "out", scenario)
+    with pytest.raises(OutputFolderError, match=r"scenario\.duration is 0\.2 there, 0\.3 here"):
+        StoredRuns(tmp_path / "out", replace(scenario, duration=0.3))
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    with pytest.raises(OutputFolderError, match=r"out: cannot be written: No space left.*kept"):
+        folder.store(runs.records[0])
+    (tmp_path / "out" / "arguments.json").write_text("{")
+    with pytest.raises(OutputFolderError, match="no JSON"):
+        StoredRuns(tmp_path / "out", scenario)
 
 
 def test_all_runs_as_one_table(runs, tmp_path):

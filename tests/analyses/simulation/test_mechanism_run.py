@@ -242,7 +242,7 @@ def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
     ("arguments", "words"),
     [
         (("simulate", ARM, "--meshcat"), "--meshcat: found with the kind mechanism"),
-        (("simulate", ARM, "--seeds", "0:2"), "accepted for visual servos"),
+        (("simulate", ARM, "--seeds", "0:2"), "accepted: with visual servos"),
         (("simulate", ARM, "--video"), "has no camera"),
         (("serve", ARM), "kind: found mechanism; accepted by cdpr serve"),
     ],

@@ -214,7 +214,7 @@ REFUSED = {
     "runs from": (lambda path: run(path / "r", runs_from=path), "accepted: a folder of this study"),
     "other form": (
         lambda path: (run(path / "r"), run(path / "r", quick=False)),
-        "quick is true there, false here; name another folder or allow overwrite",
+        "quick is true there, false here; name another folder or add overwrite",
     ),
 }
 

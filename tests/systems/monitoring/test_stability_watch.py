@@ -155,10 +155,10 @@ def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkey
     ("arguments", "words"),
     [
         (["--along", "nowhere"], "nowhere: found no log; accepted: a folder of a visual servo"),
-        (["planar", "--along", "x"], "--along: found beside robot"),
-        (["--along", "x", "--seed", "2"], "--along: found beside --seed"),
+        (["planar", "--along", "x"], "found 'planar' with --along; accepted: fewer words"),
+        (["--along", "x", "--seed", "2"], "--seed: found with --along; accepted: without --along"),
         (["--along", "x", "--threshold", "-1"], "--threshold: found -1; accepted: >= 0 [N]"),
-        (["planar", "--threshold", "1"], "--threshold: accepted with --along only"),
+        (["planar", "--threshold", "1"], "--threshold: found without --along; accepted: with"),
     ],
 )
 def test_what_the_command_refuses(arguments, words, capsys, tmp_path, monkeypatch):
