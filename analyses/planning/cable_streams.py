@@ -210,11 +210,11 @@ def cable_stream(plan: Plan, rate: float, model: str | None = None) -> CableStre
     times = np.arange(int(end * rate + MOMENT) + 1) / rate
     if end > times[-1] + MOMENT:
         times = np.append(times, end)
-    wanted = sample_motion(plan.task, motion, times).tensions
+    planned = sample_motion(plan.task, motion, times).tensions
     poses = [motion.pose(float(t)) for t in times]
     lengths = np.array([
         _unstrained(cables, model, X, t, when)
-        for X, t, when in zip(poses, wanted, times, strict=True)
+        for X, t, when in zip(poses, planned, times, strict=True)
     ])  # fmt: skip
     straight = np.array([cable_paths(X, cables).lengths for X in poses])
     zero = _zero_lengths(robot, cables, model, lengths[0])

@@ -10,7 +10,6 @@ nothing is fed back.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -234,9 +233,10 @@ def rests_on(motion: ShapedRest, cables: CableSettings) -> tuple[Equilibrium, Eq
         EquilibriumError: There is no pose of rest nearby.
     """
     real, platform = cables.cable_set(motion.robot), rigid_platform(motion.robot)
+    model = cables.model_of(motion.robot)
     start, goal = (
-        equilibrium_near(real, cables.model_of(motion.robot), platform, motion.lengths(s), one.X_WP)
-        for s, one in ((0.0, motion.start), (1.0, motion.goal))
+        equilibrium_near(real, model, platform, motion.lengths(s), rest.X_WP)
+        for s, rest in ((0.0, motion.start), (1.0, motion.goal))
     )
     return start, goal
 
@@ -248,8 +248,8 @@ def _velocities(motion: ShapedRest, end: float) -> PiecewisePolynomial:
     # Held from the beginning of each period: half a period early, the velocity is that of the
     # period, whichever way times are rounded.
     velocities = np.column_stack([steps, np.zeros(len(steps))])
-    found: Any = PiecewisePolynomial.ZeroOrderHold(times - 0.5 * PERIOD, velocities)
-    return found
+    held: PiecewisePolynomial = PiecewisePolynomial.ZeroOrderHold(times - 0.5 * PERIOD, velocities)
+    return held
 
 
 def _lengths(

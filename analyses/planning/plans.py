@@ -120,13 +120,17 @@ class Plan(Result):
                 "speed_m_s": limits.speed,
             },
             "largest_share_of_limits": float(np.max(self.shares)),
-            "instants_at_a_limit": float(np.mean(self.shares >= REACHED)),
+            "instants_at_a_limit": self.reached_share(),
             "reached": self.reached(),
             "tracked": None if self.tracked is None else self.tracked.as_dict(),
             **({} if self.stream is None else {"stream": self.stream.as_dict()}),
             "versions": package_versions(),
         })  # fmt: skip
         return result
+
+    def reached_share(self) -> float:
+        """Share of the instants at which a limit is reached."""
+        return float(np.mean(self.shares >= REACHED))
 
     def reached(self) -> dict[str, int]:
         """Steps of control at which each limit is reached, of those that are."""
@@ -145,7 +149,7 @@ class Plan(Result):
         tensions, limits = self.samples.tensions, self.task.limits
         lines = [
             *self.description(),
-            f"at a limit in {np.mean(self.shares >= REACHED):.1%} of all instants; largest share "
+            f"at a limit in {self.reached_share():.1%} of all instants; largest share "
             f"of a limit {np.max(self.shares):.4f}",
             f"tensions {np.min(tensions):.4g} to {np.max(tensions):.4g} N, limits "
             f"{limits.lower:g} to {limits.upper:g} N",

@@ -105,18 +105,18 @@ def plan_shot_rest(
         linear = [s.linear(c, x, g) for s, x, g in zip(shooters, nodes, gaps, strict=True)]
         y = _least(R, c, [chain[-1] for chain in linear])
         for share in (1.0, 0.5, 0.25, 0.1):
-            c_there = c + share * (y - c)
-            there = [
+            c_next = c + share * (y - c)
+            moved = [
                 [shooter.moved(x, share * (M @ (y - c).ravel() + g))
                  for x, (M, g) in zip(mine, chain[:-1], strict=True)]
                 for shooter, mine, chain in zip(shooters, nodes, linear, strict=True)
             ]  # fmt: skip
-            now, gaps_there = _missed(shooters, c_there, there)
-            if now < missed:
+            nearer, gaps_next = _missed(shooters, c_next, moved)
+            if nearer < missed:
                 break
         else:
             break  # as near as differences lead
-        c, nodes, missed, gaps = c_there, there, now, gaps_there
+        c, nodes, missed, gaps = c_next, moved, nearer, gaps_next
     for shooter, mine in zip(shooters, nodes, strict=True):
         shooter.check_taut(c, mine)
     if missed > REACHED:
@@ -141,8 +141,8 @@ def _least(R: Array, c: Array, ends: Sequence[tuple[Array, Array]]) -> Array:
     """The correction of the least y' R y of which all linearised motions end at rest, as c."""
     reach, gap = (np.concatenate(part) for part in zip(*ends, strict=True))
     cost = np.kron(np.linalg.inv(R), np.eye(c.shape[1]))
-    wanted = reach @ c.ravel() - gap
-    y = cost @ reach.T @ np.linalg.lstsq(reach @ cost @ reach.T, wanted, rcond=RANK)[0]
+    target = reach @ c.ravel() - gap
+    y = cost @ reach.T @ np.linalg.lstsq(reach @ cost @ reach.T, target, rcond=RANK)[0]
     return np.asarray(y.reshape(c.shape))
 
 
@@ -159,7 +159,7 @@ class _Shooter:
 
     def __init__(self, plain: ShapedRest, ratio: float) -> None:
         """For cables of so many times the stiffness of those of a motion."""
-        robot, given = plain.robot, plain.cables
+        robot, cables = plain.robot, plain.cables
         if robot.contact_hysteresis() is not None:
             raise PlanningError(
                 f"platform.hysteresis of {robot.name}: found a section; accepted by a motion from "
@@ -167,7 +167,7 @@ class _Shooter:
             )
         self.plain, self.m = plain, len(robot.cables)
         self._knots, _ = _splines(plain.duration)
-        settings = replace(given, stiffness_ratio=ratio * given.stiffness_ratio)
+        settings = replace(cables, stiffness_ratio=ratio * cables.stiffness_ratio)
         self._cables = settings.cable_set(robot)
         block = CompiledCableRobot(robot, CableRobotSettings(cables=settings))
         self._block, self._joint = block.motion, robot.joint()
@@ -229,16 +229,15 @@ class _Shooter:
         new[self._n - nv :] += by[nv:]
         return new
 
-    def apart(self, one: Array, other: Array) -> Array:
+    def apart(self, first: Array, second: Array) -> Array:
         """The step from a state to another one, shape (2 nv,) [m]."""
-        nv = self._nv
+        size, step = self._n - self._nv, second - first
+        place = step[:size]
         if self._joint.is_floating:
-            X, Y = (pose_on_joint(self._joint, state) for state in (one, other))
+            X, Y = (pose_on_joint(self._joint, state) for state in (first, second))
             turn = rotation_vector(Y.rotation() @ X.rotation().inverse())
-            place = np.concatenate([turn, other[4:7] - one[4:7]])
-        else:
-            place = (other - one)[: self._n - nv]
-        return np.concatenate([place, (other - one)[self._n - nv :]]) / self.scale
+            place = np.concatenate([turn, step[4:7]])
+        return np.concatenate([place, step[size:]]) / self.scale
 
     def shot(
         self, state: Array, c: Array, segment: _Segment,
@@ -314,12 +313,12 @@ class _Shooter:
             A[:, i] = (self.apart(end, ahead) - self.apart(end, behind)) / (2.0 * SMALL)
         for i in segment.active:
             for j in range(self.m):
-                sides = []
+                ends = []
                 for h in (SMALL, -SMALL):
-                    there = c.copy()
-                    there[i, j] += h
-                    sides.append(self.apart(end, self.shot(state, there, segment)))
-                B[:, i, j] = (sides[0] - sides[1]) / (2.0 * SMALL)
+                    changed = c.copy()
+                    changed[i, j] += h
+                    ends.append(self.apart(end, self.shot(state, changed, segment)))
+                B[:, i, j] = (ends[0] - ends[1]) / (2.0 * SMALL)
         return A, B.reshape(size, -1)
 
     def check_taut(self, c: Array, nodes: list[Array]) -> None:

@@ -46,6 +46,7 @@ def test_motor_angles_are_lengths_over_drums(plan):
     wound = stream.motor_angles * radius / plan.robot.winch.gear_ratio
     np.testing.assert_allclose(wound, paid_out, rtol=0.05, atol=1e-9)
     assert np.all(np.sign(stream.motor_angles) == np.sign(paid_out))
+    assert np.all(stream.stretch > 0.0)
 
 
 def test_a_stream_that_is_too_coarse_lets_cables_go_slack(plan):

@@ -68,7 +68,7 @@ def test_robust_shooting_minds_a_wrong_stiffness_less():
 
 @pytest.mark.parametrize(("name", "plan", "longer", "refusal"), [
     ("steel", plan_shot_rest, 2 / 3, r"in which C\d gets slack at 0\.0"),
-    ("rubber", plan_shaped_rest, 4 / 9,
+    ("rubber", plan_shot_rest, 4 / 9,
      r"duration: found 0.2 s, in which C\d would be wound"),
     ("steel", plan_shaped_rest, 0.0, "duration: found 0 s"),
 ])  # fmt: skip
