@@ -25,12 +25,11 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from cdpr_drake import palette
 from cdpr_drake.analyses.frame.thinning import extreme_rows, spans
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import SHADED, Look, nth_look
-
-DEFAULT_FORMATS = ("png",)
 
 CYCLE = (
     *palette.DASHES, (0.0, (7.0, 2.0, 1.0, 2.0, 1.0, 2.0)), (0.0, (10.0, 3.0)), (0.0, (3.0, 1.0)),

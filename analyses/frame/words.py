@@ -94,6 +94,10 @@ def some_names(word: str) -> list[str]:
     return [] if word.strip() == "none" else names(word)
 
 
+DEFAULT_FORMATS = ("png",)
+"""Of figures in files."""
+
+
 def formats(word: str) -> list[str]:
     """Endings of files, each once."""
     found = list(dict.fromkeys(names(word.lower())))

@@ -19,8 +19,9 @@ from cdpr_drake.analyses.calibration.camera_report import (
     camera_tables,
     fitted_camera,
 )
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.frame.figures import write_figures
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole

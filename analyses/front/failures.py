@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.frame.figures import figure_writers
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.session import Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictures
 from cdpr_drake.analyses.reporting.left_folders import RESULTS

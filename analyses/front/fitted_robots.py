@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from rich.table import Table
 
 from cdpr_drake.analyses.calibration.log_fit import LogFit
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, write_figures
+from cdpr_drake.analyses.frame.figures import write_figures
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.analyses.reporting.deferred_figures import drawing
 from cdpr_drake.analyses.reporting.output_folder import results_folder

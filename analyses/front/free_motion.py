@@ -17,8 +17,8 @@ from cdpr_drake.analyses.calibration.free_motion import (
 )
 from cdpr_drake.analyses.calibration.free_motion_report import free_motion_fit
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
 from cdpr_drake.errors import IdentificationError, accepted_names

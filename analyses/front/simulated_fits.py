@@ -23,8 +23,8 @@ from cdpr_drake.analyses.calibration.identification_campaign import (
 )
 from cdpr_drake.analyses.calibration.identification_campaign_files import write_dynamic_campaign
 from cdpr_drake.analyses.calibration.log_fit import ROBOT
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.calibration import proposed_poses
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session

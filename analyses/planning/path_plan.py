@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import (
     COVERED_LINE,
-    DEFAULT_FORMATS,
     bare_figure,
     line_style,
     styled,
@@ -24,6 +23,7 @@ from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
+    DEFAULT_FORMATS,
     Formats,
     InputFile,
     Limits,

@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
+    DEFAULT_FORMATS,
     Formats,
     InputFile,
     Limits,

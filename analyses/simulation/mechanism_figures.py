@@ -13,7 +13,6 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.tree import QuaternionFloatingJoint
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     curves,
     draw_curve,
     figure_writers,
@@ -23,6 +22,7 @@ from cdpr_drake.analyses.frame.figures import (
 )
 from cdpr_drake.analyses.frame.figures import panels as figure_panels
 from cdpr_drake.analyses.frame.thinning import by_pieces
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.simulation.mechanism_run import (
     MechanismRun,

@@ -14,13 +14,13 @@ from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     draw_curve,
     figure_writers,
     line_style,
     new_figure,
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.provenance import package_versions, write_run_inputs

@@ -12,7 +12,6 @@ from pydrake.geometry import Box, Meshcat
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     curves,
     draw_curve,
     figure_writers,
@@ -22,6 +21,7 @@ from cdpr_drake.analyses.frame.figures import (
     shared_legend,
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     curves,
     draw_curve,
     figure_writers,
@@ -21,6 +20,7 @@ from cdpr_drake.analyses.frame.figures import (
     shade,
 )
 from cdpr_drake.analyses.frame.thinning import by_pieces, path_rows
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.simulation.adaptation_report import adaptation_figure
 from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, write_json, write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs

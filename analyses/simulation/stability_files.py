@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     draw_curve,
     line_style,
     new_figure,
@@ -22,7 +21,7 @@ from cdpr_drake.analyses.frame.figures import (
 )
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.frame.words import Formats, OutFolder, words
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS, Formats, OutFolder, words
 from cdpr_drake.analyses.reporting.left_folders import holds_log
 from cdpr_drake.analyses.reporting.log_files import finite, write_json
 from cdpr_drake.analyses.reporting.log_on_disk import PARTS, Log, LogOnDisk

@@ -14,13 +14,13 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 
 from cdpr_drake.analyses.frame.figures import (
-    DEFAULT_FORMATS,
     draw_curve,
     figure_writers,
     new_figure,
     shade,
 )
 from cdpr_drake.analyses.frame.thinning import by_pieces, path_rows
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.log_files import LogNames, finite, spread, write_json, write_log
 from cdpr_drake.analyses.reporting.log_on_disk import Log

@@ -17,10 +17,10 @@ from typing import Any
 import jinja2
 import pandas as pd
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.provenance import browser, code_version, package_versions
 from cdpr_drake.analyses.studies.facts import GOOD, Entry, Fact, sources
 from cdpr_drake.analyses.studies.study import RESULTS, STUDIES, run_study

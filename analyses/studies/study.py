@@ -23,11 +23,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS, figure_writers
+from cdpr_drake.analyses.frame.figures import figure_writers
 from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
 from cdpr_drake.analyses.studies.facts import (

@@ -12,10 +12,10 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.figures import DEFAULT_FORMATS
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
+    DEFAULT_FORMATS,
     Box,
     Formats,
     InputFile,
