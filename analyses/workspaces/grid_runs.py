@@ -15,7 +15,6 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdpr_drake.analyses.frame.figures import figure_writers
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
 from cdpr_drake.analyses.frame.follow import Count, Follow
 from cdpr_drake.analyses.frame.jobs import finished_jobs
@@ -184,6 +183,8 @@ class GridResult(Result):
     def write(self, folder: Folder, formats: Sequence[str], follow: Follow) -> dict[str, str]:
         """Writes numbers, figures and the page; returns why figures were not written, by file."""
         folder.write_json(RESULTS, self.as_dict())
+        from cdpr_drake.analyses.frame.figures import figure_writers
+
         page, note = ({}, "") if self.robot is None else self.page(self.robot)
         if note:
             follow.say(f"note: {note}")
