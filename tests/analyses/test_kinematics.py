@@ -113,6 +113,10 @@ def test_measured_lengths_give_the_pose_with_its_deviation():
     assert abs(np.mean(squares) - 6.0) < 4.0 * np.sqrt(12.0 / 200)
     assert abs(np.mean(scatters) / NOISE**2 - 1.0) < 4.0 * np.sqrt(1.0 / 200)
     told = as_json(fit)
+    C = fit.fit.covariance(fit.fit.scatter())  # of turns, then of the position
+    np.testing.assert_allclose(
+        np.square(fit.deviations()), [np.trace(C[3:, 3:]), np.trace(C[:3, :3])]
+    )
     assert told["position_deviation_m"] < 2e-4
     assert told["length_scatter_m"] > 0.0
     assert "standard deviation" in shows_itself(fit)
