@@ -19,7 +19,7 @@ from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
 from cdpr_drake.analyses.frame.jobs import default_workers, finished_jobs
 from cdpr_drake.analyses.frame.result import Listing, Result, Table
 from cdpr_drake.analyses.reporting.provenance import browser
-from cdpr_drake.errors import CdprError, StoppedError
+from cdpr_drake.errors import CdprError, StoppedError, install_words
 from cdpr_drake.kernel_cache.background import compile_needed
 from cdpr_drake.kernel_cache.kernel_list import group_names, missing_kernels, needed_kernels
 from cdpr_drake.models.rendered_camera import check_rendering
@@ -95,7 +95,7 @@ def _extra(name: str, extra: str, serves: str) -> Finding:
     try:
         return Finding(name, True, version(name))
     except PackageNotFoundError:
-        remedy = f"pip install 'cdpr_drake[{extra}]'"
+        remedy = install_words(extra)
         return Finding(name, True, f"absent; for {serves}: {remedy}")
 
 

@@ -32,7 +32,7 @@ from cdpr_drake.analyses.frame.jobs import Processes, finished_jobs
 from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, DesignError
+from cdpr_drake.errors import CdprError, DesignError, install_words
 from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.own_terms import ProgramReport
@@ -237,7 +237,7 @@ def evolve(
         from cmaes import CMA
     except ImportError as problem:
         raise DesignError(
-            "design: the package cmaes is not installed; pip install 'cdpr_drake[design]'"
+            f"design: the package cmaes is not installed; {install_words('design')}"
         ) from problem
     padded = max(size, 2)  # CMA wants several coordinates: the second of one does nothing
     search = CMA(

@@ -323,6 +323,7 @@ def lay_out(figure: Figure) -> LayoutEngine | None:
         with styled(), warnings.catch_warnings():
             # Matplotlib measures the time: on a busy machine it warns of any legend.
             warnings.filterwarnings("ignore", 'Creating legend with loc="best"', UserWarning)
+            warnings.filterwarnings("ignore", "constrained_layout not applied", UserWarning)
             for _ in range(FIXED_ASPECT_ROUNDS if fixed else 1):
                 engine.execute(figure)
             figure.set_layout_engine(None)

@@ -88,6 +88,7 @@ class Folder:
         with self.writing():
             self._made = [path for path in (self.path, *self.path.parents) if not path.exists()]
             self.path.mkdir(parents=True, exist_ok=True)
+            lock_was_there = (self.path / LOCK).exists()
             try:
                 self._lock.acquire(timeout=0)
             except Timeout:
@@ -95,6 +96,8 @@ class Folder:
             try:
                 self._open()
             except BaseException:
+                if not lock_was_there:
+                    (self.path / LOCK).unlink(missing_ok=True)
                 self._release()
                 raise
         return self

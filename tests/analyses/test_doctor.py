@@ -42,4 +42,4 @@ def test_a_check_that_fails_names_the_remedy_and_the_rest_still_run(
 def test_what_is_optional_and_absent_is_no_fault_but_named():
     finding = doctor._extra("no-such-package", "gym", "learning environments")
     assert finding.passed
-    assert "pip install 'cdpr_drake[gym]'" in finding.found
+    assert "pip install '.[gym]'" in finding.found
