@@ -22,6 +22,7 @@ from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias
 from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.proven_sets import PoseSets
 from tests.analyses.planning.plan_command import drawn, planned, run, summary, table, undrawn
+from tests.messages import printed
 
 ENDS = ["--from=-0.15,0,0.25", "--to=0.15,0,0.25"]
 BOXES = 6000
@@ -79,7 +80,7 @@ def test_a_free_motion_starts_from_it(capsys, folder, tmp_path):
     answer = planned(tmp_path / "a", ROBOT, "--free", *ENDS, *words)
     assert answer["arguments"]["guess"] == guess
     assert answer["duration_s"] < summary(folder)["duration_s"]
-    capsys.readouterr()
+    printed(capsys)
     code, _, err = run(capsys, ROBOT, "--free", ENDS[0], "--to=0.2,0,0.25", *words)
     assert (code, "guess: ends 0.05 m and 0 deg from there" in err) == (2, True)
 
