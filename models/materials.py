@@ -3,6 +3,7 @@
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
@@ -68,6 +69,10 @@ class CableMaterial:
     behaviour: BehaviourSettings | None = optional_section(
         "Stiffening, heat, creep and friction of sheaves, for straight cables; null: none."
     )
+
+    def axial_stiffness(self) -> float:
+        """E S of a round cable [N]."""
+        return float(self.youngs_modulus * math.pi * self.diameter**2 / 4.0)
 
 
 @dataclass(kw_only=True)

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.robot_schema import Pose, TensionBounds
 from cdpr_drake.schema.fields import (
@@ -166,9 +165,7 @@ class Mechanism(Summarized):
 
     def stiffness(self) -> Array:
         """Axial stiffness E S of every cable, shape (m,) [N]."""
-        return np.array(
-            [axial_stiffness(each.youngs_modulus, each.diameter) for each in self.materials()]
-        )
+        return np.array([material.axial_stiffness() for material in self.materials()])
 
     def tension_limits(self, given: tuple[float, float] | None = None) -> tuple[float, float]:
         """Smallest and largest tension [N]: the given ones, or those that the file accepts."""

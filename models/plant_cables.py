@@ -22,8 +22,7 @@ from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel as kernels
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_routes
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, STRAIGHT, check_routes
 from cdpr_drake.cables.simulation_kernel import OUTPUTS
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY, CableRoutes, Integers

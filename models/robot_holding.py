@@ -8,7 +8,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import CABLE_MODELS, cable_state, check_breaking
+from cdpr_drake.cables.models import CABLE_MODELS
+from cdpr_drake.cables.states import cable_state, check_breaking
 from cdpr_drake.errors import CableGeometryError, CdprError, InfeasibleTensionError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

@@ -11,7 +11,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
-from cdpr_drake.cables.elastic_law import axial_stiffness
 from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import RobotFileError, TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_jacobian
@@ -325,9 +324,7 @@ class Robot(Summarized):
 
     def stiffness(self) -> Array:
         """Axial stiffness E S of every cable, shape (m,) [N]."""
-        return np.array(
-            [axial_stiffness(each.youngs_modulus, each.diameter) for each in self.materials()]
-        )
+        return np.array([material.axial_stiffness() for material in self.materials()])
 
     def knows_breaking_loads(self) -> bool:
         """Whether the file says of any cable when it breaks."""

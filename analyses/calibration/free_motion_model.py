@@ -18,7 +18,8 @@ from scipy.spatial.transform import Rotation
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables, behaviour_of
-from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT, cable_derivatives
+from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT
+from cdpr_drake.cables.states import cable_derivatives
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.dynamics.free_run_kernel import free_run
 from cdpr_drake.dynamics.robot_arrays import CREEPING, RUBBING, Drive, RobotArrays, pack_robot

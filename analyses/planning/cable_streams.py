@@ -22,13 +22,8 @@ from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.elastic_law import unstrained_lengths
-from cdpr_drake.cables.models import (
-    CABLE_MODELS,
-    CATENARY,
-    ELASTIC,
-    cable_derivatives,
-    cable_state,
-)
+from cdpr_drake.cables.models import CABLE_MODELS, CATENARY, ELASTIC
+from cdpr_drake.cables.states import cable_derivatives, cable_state
 from cdpr_drake.errors import CdprError, PlanningError, accepted_names
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

@@ -22,8 +22,8 @@ from cdpr_drake.cables.cable_behaviour import (
     drum_tensions,
     tangent_cables,
 )
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, INEXTENSIBLE, cable_state, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, INEXTENSIBLE, STRAIGHT, check_model
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.errors import CableModelError, EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

@@ -1,7 +1,7 @@
 """The law of a cable by its number: at rest, in motion, its energy, and when it is slack.
 
-Here and nowhere else kernels tell cables apart. A further law is a kernel file, a number here with
-a branch in each of the functions that it answers in another way, and a row of
+Here and nowhere else kernels tell cables apart. A further law is a kernel file, a number in
+`models`, here a branch in each of the functions that it answers in another way, and a row of
 `models.CABLE_MODELS`; a model by a law that is there is a row only. Laws are not called by address
 as tension methods are: their sources also run on other scalars, see `simulation_autodiff`.
 """
@@ -21,6 +21,7 @@ from cdpr_drake.cables.behaving_kernel import (
 )
 from cdpr_drake.cables.elastic_law import sagging_energy, straight_energy
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.models import BEHAVING, HANGING
 from cdpr_drake.cables.response_kernel import (
     sagging_motion,
     sagging_response,
@@ -28,11 +29,6 @@ from cdpr_drake.cables.response_kernel import (
     straight_response,
 )
 from cdpr_drake.geometry.motion_kernel import Motion
-
-STRAIGHT, HANGING, BEHAVING = range(3)
-"""Laws: a straight spring that only pulls, an elastic cable that sags under its own weight, and a
-straight one that does what `cable_behaviour` says. A cable without weight is straight by the
-second, too."""
 
 SLACK_WEIGHTS = 1.0
 """A cable is slack whose tension at the platform is at most this many times its own weight.

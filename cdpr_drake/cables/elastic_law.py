@@ -25,11 +25,6 @@ _WEIGHTS = (5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0)
 """Of Gauss' rule with three points on [0, 1]."""
 
 
-def axial_stiffness(youngs_modulus: float, diameter: float) -> float:
-    """E S of a round cable [N] from Young's modulus E [Pa] and diameter [m]."""
-    return float(youngs_modulus * np.pi * diameter**2 / 4.0)
-
-
 def unstrained_lengths(lengths: Array, tensions: Array, stiffness: Array) -> Array:
     """Unstrained lengths l0 = l / (1 + t / E S) of taut cables, shape (m,) [m].
 

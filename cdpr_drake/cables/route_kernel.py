@@ -19,14 +19,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import (
-    HANGING,
-    STRAIGHT,
-    cable_energy,
-    cable_motion,
-    slack_tension,
-)
+from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_motion, slack_tension
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.models import HANGING, STRAIGHT
 from cdpr_drake.cables.response_kernel import DERIVATIVES, straight_motion
 from cdpr_drake.cables.simulation_kernel import write_outputs
 from cdpr_drake.cables.straight_kernel import cable_pull

@@ -10,8 +10,8 @@ from pydrake.autodiffutils import AutoDiffXd
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel, simulation_kernel
 from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
-from cdpr_drake.cables.dispatch_kernel import HANGING, STRAIGHT
 from cdpr_drake.cables.hanging_kernel import equations, solve_catenary
+from cdpr_drake.cables.models import HANGING, STRAIGHT
 from cdpr_drake.cables.route_kernel import make_route_room, make_tree_room
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room
 from cdpr_drake.geometry.two_pulleys_kernel import begin_swivels

@@ -13,8 +13,9 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT, cable_motion, slack_tension
+from cdpr_drake.cables.dispatch_kernel import cable_motion, slack_tension
 from cdpr_drake.cables.hanging_kernel import SENSITIVITIES
+from cdpr_drake.cables.models import STRAIGHT
 from cdpr_drake.cables.response_kernel import DERIVATIVES, straight_motion
 from cdpr_drake.geometry.motion_kernel import Motion, joint_motion
 

@@ -14,7 +14,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.commanded_tension_kernel import tension_force
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import STRAIGHT
 from cdpr_drake.cables.simulation_kernel import guesses_of, model_force_and_drums
 from cdpr_drake.cables.straight_kernel import line_force, planar_force
 from cdpr_drake.cables.straight_lanes_kernel import floating_lanes_force, put_columns

@@ -10,14 +10,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import (
-    CABLE_MODELS,
-    ELASTIC,
-    TOO_SHORT,
-    cable_law,
-    cable_state,
-    check_model,
-)
+from cdpr_drake.cables.models import CABLE_MODELS, ELASTIC, cable_law, check_model
+from cdpr_drake.cables.states import TOO_SHORT, cable_state
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet

@@ -10,8 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.solvers import MathematicalProgram, SnoptSolver, SolverOptions
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, cable_law, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, STRAIGHT, cable_law, check_model
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet

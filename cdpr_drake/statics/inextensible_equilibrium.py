@@ -6,7 +6,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import INEXTENSIBLE, TOO_SHORT
+from cdpr_drake.cables.models import INEXTENSIBLE
+from cdpr_drake.cables.states import TOO_SHORT
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.geometry.cable_paths import CablePaths, cable_paths, motion_of
 from cdpr_drake.geometry.cable_set import CableSet

@@ -8,9 +8,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_law, check_model
+from cdpr_drake.cables.dispatch_kernel import all_responses
+from cdpr_drake.cables.models import CABLE_MODELS, STRAIGHT, cable_law, check_model
 from cdpr_drake.cables.response_kernel import DERIVATIVES
+from cdpr_drake.cables.states import cable_derivatives
 from cdpr_drake.errors import CableGeometryError, CableModelError, EquilibriumError
 from cdpr_drake.geometry.cable_paths import impossible_cable, motion_of
 from cdpr_drake.geometry.cable_set import CableSet

@@ -9,7 +9,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaviour_of, counted_lengths
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_state, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, check_model
+from cdpr_drake.cables.states import cable_derivatives, cable_state
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

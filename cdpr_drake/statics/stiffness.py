@@ -9,8 +9,8 @@ from pydrake.math import RigidTransform
 from scipy.linalg import eigh
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, cable_law, check_lengths, check_model
+from cdpr_drake.cables.models import CABLE_MODELS, STRAIGHT, cable_law, check_model
+from cdpr_drake.cables.states import check_lengths
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths, impossible_cable
 from cdpr_drake.geometry.cable_set import CableSet

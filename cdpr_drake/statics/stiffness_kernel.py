@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit, types
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT, all_responses
+from cdpr_drake.cables.dispatch_kernel import all_responses
+from cdpr_drake.cables.models import STRAIGHT
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.geometry.cable_paths import SHORTEST
 from cdpr_drake.geometry.pulley_kernel import pulley_line, unit_vector_derivative

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import KELVIN_VOIGT, cable_state
+from cdpr_drake.cables.models import KELVIN_VOIGT
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.dynamics.robot_arrays import TENSIONS, Drive, RobotArrays, pack_robot
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

@@ -9,8 +9,9 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import put_crept
-from cdpr_drake.cables.models import cable_law, crept_at_rest
+from cdpr_drake.cables.models import cable_law
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
+from cdpr_drake.cables.states import crept_at_rest
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
 from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, RUBBING, pack_robot

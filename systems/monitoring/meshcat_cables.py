@@ -13,7 +13,8 @@ from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.curves import cable_curves
-from cdpr_drake.cables.models import ELASTIC, slack_tensions
+from cdpr_drake.cables.models import ELASTIC
+from cdpr_drake.cables.states import slack_tensions
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import SLACK, TENSIONS, UNKNOWN, rgb
 from cdpr_drake.systems.robots.settings import CableSettings

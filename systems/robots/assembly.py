@@ -15,7 +15,7 @@ from pydrake.systems.primitives import Adder, Demultiplexer, MatrixGain
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaviour_of
-from cdpr_drake.cables.models import crept_at_rest
+from cdpr_drake.cables.states import crept_at_rest
 from cdpr_drake.errors import CableModelError, CdprError, accepted_names
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet

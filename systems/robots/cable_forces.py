@@ -25,14 +25,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import creep_rates, put_crept
 from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.cable_behaviour import behaviour_of
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import (
-    CABLE_MODELS,
-    KELVIN_VOIGT,
-    cable_law,
-    check_model,
-    crept_at_rest,
-)
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, STRAIGHT, cable_law, check_model
 from cdpr_drake.cables.simulation_autodiff import (
     creep_rates_array,
     model_force_and_drums_array,
@@ -47,6 +40,7 @@ from cdpr_drake.cables.simulation_kernel import (
     model_force_and_drums,
     outputs_kernel,
 )
+from cdpr_drake.cables.states import crept_at_rest
 from cdpr_drake.cables.straight_kernel import floating_force, line_force, planar_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import impossible_cable

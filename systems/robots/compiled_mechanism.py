@@ -16,8 +16,7 @@ from pydrake.systems.framework import (
     LeafSystem,
 )
 
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, STRAIGHT
 from cdpr_drake.cables.route_kernel import make_route_room
 from cdpr_drake.cables.simulation_kernel import OUTPUTS
 from cdpr_drake.dynamics.tree_step_kernel import (

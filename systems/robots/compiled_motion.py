@@ -25,8 +25,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.behaving_kernel import put_crept
 from cdpr_drake.cables.broken_cables import break_cables
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
-from cdpr_drake.cables.models import cable_law, crept_at_rest
+from cdpr_drake.cables.models import cable_law
 from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
+from cdpr_drake.cables.states import crept_at_rest
 from cdpr_drake.dynamics.advance_events_kernel import BACKWARD, fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED, robot_energy
 from cdpr_drake.dynamics.robot_arrays import (

@@ -26,8 +26,7 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables import route_kernel as kernels
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
-from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, check_routes
+from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT, STRAIGHT, check_routes
 from cdpr_drake.cables.simulation_autodiff import (
     route_outputs_array,
     route_wrenches_array,

@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_route_kernel import commanded_tree_force, make_pulls
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
+from cdpr_drake.cables.models import STRAIGHT
 from cdpr_drake.cables.route_kernel import make_route_room, make_tree_room
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_routes import CableRoutes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.cables.curves import GROOVE_POINTS, cable_curves
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 

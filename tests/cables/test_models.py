@@ -9,15 +9,9 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT, cable_energy, cable_response
+from cdpr_drake.cables.dispatch_kernel import cable_energy, cable_response
 from cdpr_drake.cables.hanging_kernel import solve_catenary
-from cdpr_drake.cables.models import (
-    CABLE_MODELS,
-    cable_derivatives,
-    cable_state,
-    check_breaking,
-    slack_tensions,
-)
+from cdpr_drake.cables.models import CABLE_MODELS, STRAIGHT
 from cdpr_drake.cables.response_kernel import DERIVATIVES
 from cdpr_drake.cables.simulation_autodiff import (
     model_force_and_drums_array,
@@ -33,6 +27,7 @@ from cdpr_drake.cables.simulation_kernel import (
     model_outputs,
     outputs_kernel,
 )
+from cdpr_drake.cables.states import cable_derivatives, cable_state, check_breaking, slack_tensions
 from cdpr_drake.cables.straight_kernel import floating_cables, floating_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths

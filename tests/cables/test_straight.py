@@ -7,7 +7,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions, tension_force
 from cdpr_drake.cables.elastic_law import (
-    axial_stiffness,
     cable_stiffness_matrix,
     elastic_energy,
     stretched_lengths,
@@ -300,4 +299,3 @@ def test_a_single_cable_is_a_spring_along_its_direction():
     J = np.array([[0.0, 0.0, 0.0, 0.0, 0.6, 0.8]])
     K = cable_stiffness_matrix(J, np.array([1e4]), np.array([2.0]))
     np.testing.assert_allclose(K, 5e3 * J.T @ J)
-    assert axial_stiffness(100.0e9, 2.0e-3) == pytest.approx(np.pi * 1.0e5)

@@ -9,7 +9,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.cables.curves import cable_curves
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.errors import CableModelError, CalibrationError, StabilityError
 from cdpr_drake.geometry.cable_paths import cable_paths

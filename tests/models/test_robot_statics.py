@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.analyses.statics.modelling_errors import poses_in, usual_beliefs
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.errors import (
     CableGeometryError,
     CdprError,

@@ -7,9 +7,9 @@ import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.math import RigidTransform
 
-from cdpr_drake.cables.dispatch_kernel import STRAIGHT
 from cdpr_drake.cables.elastic_law import unstrained_lengths
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_state
+from cdpr_drake.cables.models import CABLE_MODELS, STRAIGHT
+from cdpr_drake.cables.states import cable_derivatives, cable_state
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_kernel import floating_motion

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.optimize import linprog, lsq_linear
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.geometry.straight_cables import gravity_wrench

@@ -7,7 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.cables.elastic_law import cable_stiffness_matrix
-from cdpr_drake.cables.models import cable_derivatives, cable_state
+from cdpr_drake.cables.states import cable_derivatives, cable_state
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.motion_type import FREE, LEVEL, MotionType
 from cdpr_drake.geometry.poses import pose_from_angles, rotation_vector

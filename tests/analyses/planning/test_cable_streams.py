@@ -8,7 +8,8 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.cable_streams import cable_stream
-from cdpr_drake.cables.models import CATENARY, ELASTIC, cable_state
+from cdpr_drake.cables.models import CATENARY, ELASTIC
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.errors import PlanningError, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.planning.path_task import sample_motion

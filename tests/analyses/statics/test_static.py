@@ -8,7 +8,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.statics.robot_at_rest import static_at_lengths, static_at_pose
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot

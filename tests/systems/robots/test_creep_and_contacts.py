@@ -16,7 +16,8 @@ from cdpr_drake.cables.cable_behaviour import (
     strain_energy,
     tension_of_strain,
 )
-from cdpr_drake.cables.models import CABLE_MODELS, cable_derivatives, cable_law, cable_state
+from cdpr_drake.cables.models import CABLE_MODELS, cable_law
+from cdpr_drake.cables.states import cable_derivatives, cable_state
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis, contact_rates
 from cdpr_drake.dynamics.contact_kernel import SLIP, pack_contacts, rub
 from cdpr_drake.geometry.cable_paths import cable_paths

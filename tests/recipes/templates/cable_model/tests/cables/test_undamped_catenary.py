@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.cables.models import cable_state
+from cdpr_drake.cables.states import cable_state
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_robot import CableRobot
