@@ -9,17 +9,20 @@ Drake's YAML loader reads the annotations themselves, so they are not postponed 
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, Mesh, ReadObjToTriangleSurfaceMesh, Shape, Sphere
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.schema.fields import array, number, sections, switch, text
 from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
+
+if TYPE_CHECKING:  # slow to import, and most robots are boxes
+    from pydrake.geometry import Shape
+    from pydrake.multibody.tree import SpatialInertia
 
 BOX, SPHERE, CYLINDER, MESH = "box", "sphere", "cylinder", "mesh"
 
@@ -64,8 +67,10 @@ class PlatformShape:
         place = middle if self.position is None else self.position
         return pose_from_angles(np.asarray(place, float), np.radians(self.angles_deg))
 
-    def shape(self) -> Shape:
+    def shape(self) -> "Shape":
         """The shape in its own frame, as Drake has it."""
+        from pydrake.geometry import Box, Cylinder, Mesh, Sphere
+
         if self.kind == BOX:
             assert self.size is not None
             return Box(*(float(edge) for edge in self.size))
@@ -107,12 +112,14 @@ class PlatformShape:
             size = size + self.height / 2.0 * np.abs(axis)
         return X_PS.translation() - size, X_PS.translation() + size
 
-    def inertia(self, mass: float, middle: Array) -> SpatialInertia:
+    def inertia(self, mass: float, middle: Array) -> "SpatialInertia":
         """Spatial inertia about Po in P of a homogeneous body of this shape and mass [kg, m].
 
         Raises:
             RobotFileError: The mesh encloses no volume.
         """
+        from pydrake.multibody.tree import CalcSpatialInertia, SpatialInertia
+
         X_PS = self.pose(middle)
         if self.kind == MESH:
             file = mesh_in_place(Path(str(self.file)))
@@ -137,6 +144,8 @@ def _check_closed(file: str) -> None:
     Raises:
         RobotFileError: Otherwise, or the mesh is no OBJ.
     """
+    from pydrake.geometry import ReadObjToTriangleSurfaceMesh
+
     if not file.lower().endswith(".obj"):
         raise RobotFileError(f"{file}: {_NO_INERTIA}")
     mesh = ReadObjToTriangleSurfaceMesh(file)
@@ -156,6 +165,8 @@ def _check_closed(file: str) -> None:
 @lru_cache(maxsize=8)
 def _mesh_corners(file: str, scale: float, changed: int) -> Array:
     """Of the convex hull, shape (3, n) [m], read once for each state of its file."""
+    from pydrake.geometry import Mesh
+
     from cdpr_drake.models.drake_parsing import try_mesh  # which few robots need
 
     try_mesh(Path(file))
@@ -164,12 +175,15 @@ def _mesh_corners(file: str, scale: float, changed: int) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _mesh_inertia(file: str, scale: float, changed: int) -> SpatialInertia:
+def _mesh_inertia(file: str, scale: float, changed: int) -> "SpatialInertia":
     """Of a mesh with a density of 1 kg/m^3, read once for each state of its file.
 
     Raises:
         RobotFileError: It encloses no volume.
     """
+    from pydrake.geometry import Mesh
+    from pydrake.multibody.tree import CalcSpatialInertia
+
     from cdpr_drake.models.drake_parsing import drake_refusals
 
     with drake_refusals(f"{file}: {_NO_INERTIA}"):

@@ -5,6 +5,7 @@ Source: each reader's module.
 
 from __future__ import annotations
 
+import re
 import xml.etree.ElementTree as ET
 from functools import lru_cache
 from pathlib import Path
@@ -38,8 +39,14 @@ def is_foreign(path: Path) -> bool:
     return input_there(path) or not (path / "robot.yaml").is_file()
 
 
+_MARKS = re.compile(r"\bpoints[\"']?\s*:|maslow", re.IGNORECASE)
+"""What a YAML file of another tool has somewhere."""
+
+
 @lru_cache(32)  # the same robots are read again and again
 def _is_foreign_yaml(text: str) -> bool:
+    if not _MARKS.search(text):  # nearly all, which are not parsed for it
+        return False
     try:
         content = load_yaml(text)
         return is_gazebo_yaml(content) or is_maslow(content)
