@@ -144,7 +144,9 @@ def test_numbers_are_finite(name, option, word, capsys):
     assert said.startswith(f"cdpr: {option}: found ")
 
 
-@pytest.mark.parametrize(("name", "argument"), CHOSEN, ids=str)
+@pytest.mark.parametrize(
+    ("name", "argument"), CHOSEN, ids=[f"{name} {argument.name}" for name, argument in CHOSEN]
+)
 def test_a_choice_lists_what_is_accepted(name, argument, capsys):
     word = f"{argument.name}=" * is_option(argument) + argument.get_choices()[-1] + "x"
     said = refuse(capsys, name, word, *needed(name, argument.name))
