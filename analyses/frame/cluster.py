@@ -302,6 +302,17 @@ def _connected(scheduler: str) -> Iterator[Any]:
         raise SweepError(
             f"workers: found {scheduler}, and Dask is not installed; {install_words('cluster')}"
         ) from problem
+
+    class ClosingClient(Client):  # type: ignore[misc, unused-ignore]
+        """Closes itself if it cannot start; the garbage collector would do so in a traceback."""
+
+        def start(self, **kwargs: Any) -> None:
+            try:
+                super().start(**kwargs)
+            except BaseException:
+                self.close()
+                raise
+
     libraries = ("distributed", "asyncio", "tornado")  # loggers below them have levels, too
     names = [name for name in logging.root.manager.loggerDict if name.startswith(libraries)]
     loggers = [logging.getLogger(name) for name in names]
@@ -314,7 +325,7 @@ def _connected(scheduler: str) -> Iterator[Any]:
     where = {"scheduler_file": scheduler} if by_file else {"address": scheduler}
     try:
         try:
-            client = Client(timeout=SCHEDULER_TIMEOUT, set_as_default=False, **where)
+            client = ClosingClient(timeout=SCHEDULER_TIMEOUT, set_as_default=False, **where)
         except Exception as problem:
             words = (str(problem) or type(problem).__name__).splitlines()[0]
             if "ssl_context" in words:

@@ -216,7 +216,13 @@ REFUSALS = {
 
 @pytest.mark.parametrize(("word", "words"), REFUSALS.values(), ids=REFUSALS)
 def test_an_address_is_refused_in_one_line(monkeypatch, word, words):
+    """A client that cannot start is closed at once; collected later, it would print a traceback."""
     monkeypatch.setattr(module, "SCHEDULER_TIMEOUT", 1.0)
+    started, start = [], distributed.Client.start
+    monkeypatch.setattr(
+        distributed.Client, "start", lambda self, **how: (started.append(self), start(self, **how))
+    )
     with pytest.raises(SweepError, match=words) as caught:
         list(finished_jobs(square, [1], word))
     assert len(str(caught.value).splitlines()) == 1
+    assert {client.status for client in started} <= {"closed"}
