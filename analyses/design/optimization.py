@@ -26,7 +26,7 @@ from cdpr_drake.analyses.design.settings import (
     GoalSettings,
     load_design_settings,
 )
-from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.folder import Folder, write_result
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -40,7 +40,6 @@ from cdpr_drake.analyses.frame.words import (
     one_of,
     words,
 )
-from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.errors import DesignError, accepted_names
@@ -163,7 +162,7 @@ def optimize_design(
             )
             design = replace(design, confirmed=tuple(filter(None, proofs)))
         if folder is not None and not design.interrupted:
-            written(design, results, formats, follow)
+            write_result(design, results, formats, follow)
         elif folder is not None:
             design.write(results)
             follow.say("stopped; the same command goes on")
