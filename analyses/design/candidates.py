@@ -106,12 +106,14 @@ class Candidates:
     """The designs that a robot may become; pickles.
 
     Attributes:
+        present: The robot as it is.
         text: Its robot file.
         cable_sets: Sets of cables, by number, each of which is tried.
         points: Moves of its exit points, then of its anchor points, all cables, tied together.
         ranges: Least and largest value of winch fields by name.
     """
 
+    present: Robot
     text: str
     cable_sets: tuple[tuple[int, ...], ...]
     points: MovedPoints
@@ -219,8 +221,8 @@ def make_candidates(
         raise refuse("winch", f"found no motor_torque of {robot.name}, from which tensions follow; "
                      "accepted: a range of it")  # fmt: skip
     candidates = Candidates(
-        robot_text(robot_name), tuple(cable_sets) or (tuple(range(m)),), MovedPoints(half, mirrors),
-        ranges,
+        robot, robot_text(robot_name), tuple(cable_sets) or (tuple(range(m)),),
+        MovedPoints(half, mirrors), ranges,
     )  # fmt: skip
     if candidates.size == 0 and len(candidates.cable_sets) < 2:
         raise DesignError(

@@ -13,10 +13,10 @@ import numpy as np
 from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
+from cdpr_drake.analyses.design.design_result import Design
 from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals, goal_signs
 from cdpr_drake.analyses.design.search import (
     SLOPES,
-    DesignSearch,
     Slopes,
     evaluate_original,
     goal_context,
@@ -173,7 +173,7 @@ class DesignProgram(OwnTerms):
         binding = self._prog.AddCost(_CostOf(_ByDifferences(cost)), vars=self._z)
         return self._named(binding, "cost", name or ", ".join(names))
 
-    def Solve(self, follow: Follow = NOBODY) -> DesignSearch:
+    def Solve(self, follow: Follow = NOBODY) -> Design:
         """The design: two are in the result with own terms, the present robot and what was found.
 
         Args:
@@ -196,7 +196,7 @@ class DesignProgram(OwnTerms):
             evaluate_goals(self.candidates.robot(self.number, design), self.judging, self._goals)
             for design in designs
         ])  # fmt: skip
-        return DesignSearch(
+        return Design(
             self.candidates, self.settings, self.judging, self._original,
             np.full(2, self.number), designs, values,
             scores_of(values, self._original, self.settings),

@@ -15,7 +15,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.design.rails import load_rails, put_rails, rails_of
-from cdpr_drake.analyses.frame.folder import Folder, results_folder
+from cdpr_drake.analyses.frame.folder import Folder, results_folder, write_result
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -33,7 +33,6 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.frame.words import poses as parse_poses
 from cdpr_drake.analyses.kinematics import pose_numbers
 from cdpr_drake.analyses.planning.path_files import path_poses
-from cdpr_drake.analyses.planning.plans import written
 from cdpr_drake.analyses.planning.robot_path_task import make_path, pose_in_degrees
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.workspaces.robot_conditions import static_case
@@ -353,7 +352,7 @@ def reconfigure(
             around=(around, turn), folder=None if results is None else results.path,
         )  # fmt: skip
         if results is not None:
-            written(result, results, formats, follow)
+            write_result(result, results, formats, follow)
         return result
 
 

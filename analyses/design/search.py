@@ -3,10 +3,9 @@
 * `evolve` is CMA-ES by the package cmaes, a generation at a time; it needs no gradients.
 * `climb` seeks the largest least value of many smooth functions by their slopes; `SLOPES` has
   those of goals by the coordinates of a design.
-* `pareto_front` finds designs of several values that no other one dominates.
 
 Source: Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies,
-2001; Deb, Multi-objective optimization using evolutionary algorithms, 2001; see `climb`.
+2001; see `climb`.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import json
 import math
 import time
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
 from functools import cache, partial
 from itertools import count
 from pathlib import Path
@@ -24,6 +22,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from cdpr_drake.analyses.design.candidates import Candidates
+from cdpr_drake.analyses.design.design_result import Design
 from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings
 from cdpr_drake.analyses.frame.folder import Folder
@@ -33,9 +32,8 @@ from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DesignError, install_words
-from cdpr_drake.models.robot_loader import as_robot, parse_robot
+from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.numerics.own_terms import ProgramReport
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting
 from cdpr_drake.workspaces.pose_grid import grid_by_count
@@ -56,54 +54,6 @@ at first, at most, and where the search ends."""
 
 GOOD = 0.1
 """Share of the promised gain from which on a step is accepted; from half on the box grows."""
-
-
-@dataclass(frozen=True, eq=False)
-class DesignSearch:
-    """Result of a search.
-
-    Attributes:
-        candidates: The designs that there may be.
-        settings: Goals, poses and length of the search.
-        judging: What designs were judged by.
-        original: Goals of the robot as it is, larger is better, shape (goals,).
-        sets: Number of the set of cables of each design, shape (n,).
-        coordinates: The designs, in the order of the search, shape (n, size).
-        values: Their goals, larger is better, shape (n, goals).
-        scores: Weighted sums, as `scores_of`, shape (n,).
-        complete: True if it was not stopped.
-        earlier: How many of the designs an earlier command had judged.
-        wall_time: Time that the search took [s].
-        program: How a `DesignProgram` with own terms was solved; None: by a search.
-    """
-
-    candidates: Candidates
-    settings: DesignSettings
-    judging: GoalContext
-    original: Array
-    sets: np.ndarray
-    coordinates: Array
-    values: Array
-    scores: Array
-    complete: bool = True
-    earlier: int = 0
-    wall_time: float = 0.0
-    program: ProgramReport | None = None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the goals."""
-        return self.settings.goal_names
-
-    @property
-    def best(self) -> int | None:
-        """Number of the design with the largest score; None if none could be judged."""
-        return int(np.nanargmax(self.scores)) if np.any(np.isfinite(self.scores)) else None
-
-    @property
-    def front(self) -> np.ndarray:
-        """Numbers of the designs that no other one is better than in everything."""
-        return np.flatnonzero(pareto_front(self.values))
 
 
 def goal_context(robot: Robot | str, settings: DesignSettings) -> GoalContext:
@@ -152,15 +102,14 @@ def evaluate_original(candidates: Candidates, judging: GoalContext, names: Seque
     Raises:
         CdprError: It cannot be asked for a goal; says why.
     """
-    robot = parse_robot(candidates.text, Path("robot"))
-    check_goals(robot, judging, names)
-    return evaluate_goals(robot, judging, names)
+    check_goals(candidates.present, judging, names)
+    return evaluate_goals(candidates.present, judging, names)
 
 
 def search_design(
     candidates: Candidates, settings: DesignSettings, judging: GoalContext,
     folder: Folder | None = None, *, workers: int | str | None = 1, follow: Follow = NOBODY,
-) -> DesignSearch:  # fmt: skip
+) -> Design:  # fmt: skip
     """Searches the best design of each set of cables by evolution, or by slopes.
 
     With a folder that an earlier search of the same arguments has left the search goes on: designs
@@ -203,7 +152,7 @@ def search_design(
             if not complete:
                 break
     values = np.array(judge.values).reshape(-1, len(names))
-    return DesignSearch(
+    return Design(
         candidates, settings, judging, judge.original, np.array(judge.sets, int),
         np.array(judge.designs).reshape(-1, size), values, judge.scores(values), complete,
         judge.earlier, time.perf_counter() - began,
@@ -297,27 +246,6 @@ def climb(size: int, most: int, slopes_at: Callable[[Array], tuple[Array, Array]
         if promised <= 1e-9 * max(abs(value), 1e-9):
             return
         design = np.clip(best + program.x[:-1], 0.0, 1.0)
-
-
-def pareto_front(values: Array) -> np.ndarray:
-    """Which rows no other row equals or exceeds in everything and exceeds in something.
-
-    Args:
-        values: One design a row, larger is better, shape (n, k); rows with NaN never count.
-
-    Returns:
-        Shape (n,), bool. Of equal rows the first counts.
-    """
-    values = np.asarray(values, float)
-    good = np.all(np.isfinite(values), axis=1)
-    front = good.copy()
-    for i in np.flatnonzero(good):
-        better = np.all(values[good] >= values[i], axis=1) & np.any(
-            values[good] > values[i], axis=1
-        )
-        equal = np.all(values[:i] == values[i], axis=1) & good[:i]
-        front[i] = not np.any(better) and not np.any(equal)
-    return front
 
 
 Slopes = Callable[[Candidates, int, GoalContext, Array], tuple[Array, Array]]

@@ -8,12 +8,13 @@ refused and never removed.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from itertools import count
 from pathlib import Path
@@ -22,8 +23,9 @@ from typing import Any, Self
 import numpy as np
 from filelock import FileLock, Timeout
 
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.errors import OutputFolderError, StoppedError
 from cdpr_drake.schema.input_files import inputs_held
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
@@ -292,23 +294,59 @@ def free_folder(base: Path, arguments: Mapping[str, Any]) -> Path:
 @contextmanager
 def results_folder(
     name: str, arguments: Mapping[str, Any], folder: Path | str | None, overwrite: bool,
-    results: Path | None,
+    results: Path | None, grows: bool = False,
 ) -> Iterator[Folder | None]:  # fmt: skip
     """The open results folder of a verb; None if nothing is kept.
 
     Args:
-        name: Path of a folder beside `results`, if none is given, such as plans/ROBOT.
+        name: Name of a folder, if none is given: beside `results` a free one of this name, such as
+            plans/ROBOT; if it grows one in `results`, which the same arguments give again.
         arguments: All that the results depend on, for JSON.
-        folder: The folder; None: a free one of the name.
-        overwrite: As of `Folder`.
+        folder: The folder; None: one by `name`.
+        overwrite: As of `Folder`, like grows.
         results: As of `Follow`.
+        grows: True if complete results of the same arguments may get more, or be read again.
     """
     if folder is None and results is None:
         yield None
         return
+    if folder is None and grows:
+        digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()
+        folder = (results or Path()) / f"{name}-{digest[:8]}"
     path = folder or free_folder((results or Path()).parent / name, arguments)
-    with Folder(Path(path), arguments, overwrite) as opened:
+    with Folder(Path(path), arguments, overwrite, grows) as opened:
         yield opened
+
+
+def write_result(
+    result: Any, results: Folder, formats: Sequence[str], follow: Follow,
+    pages: Mapping[str, Callable[[Path], object]] | None = None,
+) -> None:  # fmt: skip
+    """Writes a result into a folder: numbers first, then figures, one of which spoils no other.
+
+    Args:
+        result: A `Result` with `write(folder)`, and `failed`, to which files that fail are added.
+        results: The open folder.
+        formats: Formats of figures.
+        follow: Who follows.
+        pages: Writers of files that are drawn like figures, by name.
+
+    Raises:
+        OutputFolderError: A file of numbers cannot be written.
+        StoppedError: The work was asked to stop before all figures were drawn.
+    """
+    from cdpr_drake.analyses.frame.figures import figure_writers
+
+    follow.doing("Writing results")
+    result.write(results)
+    writers = {**figure_writers(result.figures(), formats), **(pages or {})}
+    result.failed.update(results.write_all(writers, follow.stop))
+    if follow.stop():
+        raise StoppedError(
+            f"stopped before all figures were drawn; numbers are in {results.path}, and the same "
+            "command goes on"
+        )
+    results.complete()
 
 
 def is_locked(folder: Path) -> bool:

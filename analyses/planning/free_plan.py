@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
-from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
@@ -40,7 +39,6 @@ from cdpr_drake.analyses.planning.free_motion import (
     solve_free_motion,
 )
 from cdpr_drake.analyses.planning.path_plan import StreamModel
-from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure, reached_figure
 from cdpr_drake.analyses.planning.plans import Plan, finished
 from cdpr_drake.analyses.planning.robot_path_task import (
     RESERVE,
@@ -63,6 +61,9 @@ from cdpr_drake.workspaces.cable_interference import (
     box_row,
     clearances,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 USES = ("tensions and torques", "cable speeds", "cable accelerations", "speed of Po")
 """Columns of `MotionSamples.uses`."""
@@ -219,6 +220,8 @@ class FreeMotion(Plan):
 
     def _limits_figure(self) -> Figure:
         """Which share of its limits it uses over time, and which limits it reaches when."""
+        from cdpr_drake.analyses.planning.plan_figures import Panel, reached_figure
+
         samples, limits = self.samples, self.task.limits
         bounds = (1.0, 1.0, limits.cable_acceleration, limits.speed)
         curves = {
@@ -238,6 +241,8 @@ class FreeMotion(Plan):
 
     def _distance_figure(self) -> Figure:
         """Distances and view over time, with what was asked."""
+        from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure
+
         panels = [
             Panel(label, curves, (least,), "asked for", self.solution.times)
             for curves, label, least in (

@@ -7,23 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.planning.plans import Plan
-from cdpr_drake.analyses.planning.set_figures import (
-    acceleration_figure,
-    sets_figure,
-    sets_over_time_figure,
-    space_time_figure,
-    write_timed_replay,
-)
-from cdpr_drake.analyses.workspaces.proven_sets import (
-    ProvenSets,
-)
+from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.arrays import Array
 from cdpr_drake.planning.path_in_sets import ProvenMotion
 from cdpr_drake.planning.path_timing import PathPlan
@@ -33,6 +23,9 @@ from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.proven_sets import PoseSets
 from cdpr_drake.workspaces.timed_sets import TimedSets
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PLATFORM_KIND = "collision-free"  # the kind that keeps the platform off obstacles
 JUDGED = 2000  # samples of a motion that are judged by the exact checks of poses
@@ -223,13 +216,15 @@ class ProvenPlan(MotionInSets):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """Sets, obstacles and the path first; accelerations if they are proven."""
+        from cdpr_drake.analyses.planning import set_figures as draw
+
         figures: dict[str, Callable[[], Figure]] = {
-            "sets": partial(sets_figure, self),
+            "sets": partial(draw.sets_figure, self),
             **super().figures(),
         }
         if self.in_sets.box is not None:
             turns = self.in_sets.box.moments is not None
-            figures["accelerations"] = partial(acceleration_figure, self, turns)
+            figures["accelerations"] = partial(draw.acceleration_figure, self, turns)
         return figures
 
 
@@ -333,15 +328,19 @@ class TimedPlan(MotionInSets):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The way in space and time first."""
+        from cdpr_drake.analyses.planning import set_figures as draw
+
         return {
-            "space_time": partial(space_time_figure, self),
-            "sets": partial(sets_over_time_figure, self),
+            "space_time": partial(draw.space_time_figure, self),
+            "sets": partial(draw.sets_over_time_figure, self),
             **super().figures(),
-            "accelerations": partial(acceleration_figure, self, False),
+            "accelerations": partial(draw.acceleration_figure, self, False),
         }
 
     def pages(self) -> dict[str, Callable[[Path], object]]:
         """A replay, in which obstacles move, too."""
+        from cdpr_drake.analyses.planning.set_figures import write_timed_replay
+
         return {REPLAY: partial(write_timed_replay, self)}
 
 

@@ -7,18 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter, Token
-from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.figures import (
-    COVERED_LINE,
-    bare_figure,
-    line_style,
-    styled,
-)
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
@@ -38,7 +31,6 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.planning.path_files import path_poses
-from cdpr_drake.analyses.planning.plan_figures import reached_figure
 from cdpr_drake.analyses.planning.plans import Plan, finished
 from cdpr_drake.analyses.planning.robot_path_task import (
     CORNERS,
@@ -56,6 +48,9 @@ from cdpr_drake.planning.margin_kernel import TENSION_USE
 from cdpr_drake.planning.path_task import pose_words, sample_motion
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
 from cdpr_drake.planning.resistance import CornerMargins, resisted_along, wrench_words
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TRACKING = "computed torque, which tracking needs"
 
@@ -164,6 +159,9 @@ class PathMotion(Plan):
 
     def _phase_figure(self) -> Figure:
         """Speed along the path below the largest speeds, and which limits are reached where."""
+        from cdpr_drake.analyses.frame.figures import COVERED_LINE, line_style
+        from cdpr_drake.analyses.planning.plan_figures import reached_figure
+
         solution, samples = self.solution, self.samples
         stations, top = solution.trajectory.stations, np.sqrt(solution.largest)
 
@@ -185,6 +183,8 @@ class PathMotion(Plan):
 
     def _resistance_figure(self) -> Figure:
         """What the motion leaves of tensions and torques, alone and under wrenches to resist."""
+        from cdpr_drake.analyses.frame.figures import line_style, new_figure, styled
+
         margins, samples = self.resisted, self.samples
         assert margins is not None
         assert samples.resisted is not None
@@ -192,9 +192,9 @@ class PathMotion(Plan):
         free = replace(self.task, resist=np.empty((0, 6)))
         alone = sample_motion(free, self.motion, samples.times).uses[:, TENSION_USE]
         mark: dict[str, Any] = {"color": "black", "linestyle": "none"}
-        figure = bare_figure((11.0, 4.6), self.titled("What is left under the wrenches to resist"))
+        title = self.titled("What is left under the wrenches to resist")
+        figure, axes = new_figure(1, 1, (11.0, 4.6), title)
         with styled():
-            axes = figure.subplots()
             axes.plot(s, 1.0 - alone, label="motion alone", **line_style(IDEAL))
             label = f"with the worst of {len(margins.corners)} wrenches at each point"
             axes.plot(s, 1.0 - samples.resisted, label=label, **line_style(DISTANCE))

@@ -10,20 +10,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import (
+    LEGEND_BESIDE,
     bare_figure,
+    curves,
     draw_bars,
-    draw_curve,
     line_style,
-    phase_of,
+    panels,
     styled,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, PLATFORM, Look, nth_look
 from cdpr_drake.planning.path_task import MotionSamples
-
-BESIDE: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)}
-"""Place of a legend."""
 
 CROWDED = 24  # rows of limits that a figure shows; of more, those that are reached longest
 
@@ -48,8 +46,7 @@ class Panel:
 
     def draw(self, axes: Any, times: Array, legend: bool = True) -> None:
         """Draws the curves on axes; times of shape (n,) [s]."""
-        for k, (name, values) in enumerate(self.curves.items()):
-            draw_curve(axes, times, values, nth_look(k), name, phase=phase_of(k, len(self.curves)))
+        curves(axes, times, np.column_stack([*self.curves.values()]), [*self.curves])
         for k, value in enumerate(self.bounds):
             style = line_style(BOUND) | {"linewidth": 1.2, "zorder": 1}
             axes.axhline(value, label=None if k else self.bound, **style)
@@ -61,18 +58,17 @@ class Panel:
         axes.set_ylabel(self.label)
         axes.margins(x=0.01)
         if legend:
-            axes.legend(**BESIDE)
+            axes.legend(**LEGEND_BESIDE)
 
 
 def panel_figure(
-    title: str, size: tuple[float, float], times: Array, panels: Sequence[Panel],
+    title: str, size: tuple[float, float], times: Array, rows: Sequence[Panel],
     one_legend: bool = False,
 ) -> Figure:  # fmt: skip
     """Panels one below the other, of a size [inch]; with one legend it is that of the first."""
-    figure = bare_figure(size, title)
+    figure, places = panels(len(rows), 1, size, title, share_x=True)
     with styled():
-        places: Any = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-        for number, (axes, panel) in enumerate(zip(places, panels, strict=True)):
+        for number, (axes, panel) in enumerate(zip(places, rows, strict=True)):
             panel.draw(axes, times, legend=not (one_legend and number))
         places[-1].set_xlabel("time [s]")
     return figure

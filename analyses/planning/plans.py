@@ -7,25 +7,19 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from cdpr_drake.analyses.frame.figures import figure_writers
-from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.folder import Folder, write_result
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.planning.cable_streams import CableStream, cable_stream
-from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure
 from cdpr_drake.analyses.planning.plan_tracking import MOMENT, RATE, TrackedPlan, track_plan
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.visualization.cable_figures import cable_figure
-from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import StoppedError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import DESIRED, PLATFORM
 from cdpr_drake.planning.free_path_solution import FreePathSolution
@@ -34,6 +28,9 @@ from cdpr_drake.planning.path_task import MotionSamples, PathTask, sample_motion
 from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.trajectories.sampled_motion import MOTION_COLUMNS, TIME_COLUMN
 from cdpr_drake.trajectories.timed_path import TimedPath
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SUMMARY, MOTION = "summary.json", "motion.csv"
 
@@ -206,6 +203,8 @@ class Plan(Result):
 
     def _tension_figure(self) -> Figure:
         """Tensions with their limits: where one is reached, there is no choice."""
+        from cdpr_drake.analyses.visualization.cable_figures import cable_figure
+
         tensions, limits = self.samples.tensions, self.samples.limits
         log = {
             "time": self.samples.times, "tensions": tensions, "slack": np.zeros(tensions.shape),
@@ -218,6 +217,8 @@ class Plan(Result):
 
     def _winch_figure(self) -> Figure:
         """Speeds and accelerations of the cables, and torques of the motors, with their limits."""
+        from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure
+
         samples, limits = self.samples, self.samples.limits
         names, panels = [cable.name for cable in self.robot.cables], []
         for label, values, bound in (
@@ -234,6 +235,8 @@ class Plan(Result):
 
     def _path_figure(self) -> Figure:
         """Where the platform goes: the plan, and the simulated robot where it was tracked."""
+        from cdpr_drake.analyses.visualization.path_figures import Path3D, path_figure
+
         way = self.motion.path
         assert way is not None
         points = way.points(np.linspace(0.0, way.length, 400))
@@ -289,34 +292,5 @@ def finished(
         stream=None if stream is None else cable_stream(plan, stream, stream_model),
     )  # fmt: skip
     if results is not None:
-        written(plan, results, formats, follow, plan.pages())
+        write_result(plan, results, formats, follow, plan.pages())
     return plan
-
-
-def written(
-    result: Any, results: Folder, formats: Sequence[str], follow: Follow,
-    pages: Mapping[str, Callable[[Path], object]] | None = None,
-) -> None:  # fmt: skip
-    """Writes a result into a folder: numbers first, then figures, one of which spoils no other.
-
-    Args:
-        result: A `Result` with `write(folder)`, and `failed`, to which files that fail are added.
-        results: The open folder.
-        formats: Formats of figures.
-        follow: Who follows.
-        pages: Writers of files that are drawn like figures, by name.
-
-    Raises:
-        OutputFolderError: A file of numbers cannot be written.
-        StoppedError: The work was asked to stop before all figures were drawn.
-    """
-    follow.doing("Writing results")
-    result.write(results)
-    writers = {**figure_writers(result.figures(), formats), **(pages or {})}
-    result.failed.update(results.write_all(writers, follow.stop))
-    if follow.stop():
-        raise StoppedError(
-            f"stopped before all figures were drawn; numbers are in {results.path}, and the same "
-            "command goes on"
-        )
-    results.complete()

@@ -44,8 +44,8 @@ from cdpr_drake.analyses.workspaces.proven_sets import (
     ProofSettings,
     ProvenSets,
     explain_pose,
+    find_timed_sets,
 )
-from cdpr_drake.analyses.workspaces.timed_sets import find_timed_sets
 from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, WorkspaceError

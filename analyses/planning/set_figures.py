@@ -15,7 +15,7 @@ from pydrake.geometry import Capsule, Convex, Shape, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial import ConvexHull
 
-from cdpr_drake.analyses.frame.figures import bare_figure, styled
+from cdpr_drake.analyses.frame.figures import new_figure, panels, styled
 from cdpr_drake.analyses.planning.plan_figures import Panel, panel_figure, thick
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -51,19 +51,19 @@ def acceleration_figure(plan: MotionInSets, turns: bool) -> Figure:
     rows = np.array([motion.motion(t) for t in times])
     limits, label = np.array(about["accelerations_m_s2"]), "acceleration in W [m/s²]"
     if not turns:
-        panels = [_in_box(label, rows[:, 16:19], limits)]
+        boxes = [_in_box(label, rows[:, 16:19], limits)]
         title = plan.titled("Acceleration of Po in the proven box")
     else:
         _, terms = inertial_terms(rows, *mass_of(plan.task))
         moments = np.array(about["moments_n_m"])
-        panels = [
+        boxes = [
             _in_box(label, terms[:, :3], limits),
             _in_box("moment in P [N m]", terms[:, 3:], moments),
         ]
         title = plan.titled(
             "Acceleration of the centre of mass, and moment about it, in the proven boxes"
         )
-    return panel_figure(title, (10.0, 5.0 + 3.5 * (len(panels) - 1)), times, panels)
+    return panel_figure(title, (10.0, 5.0 + 3.5 * (len(boxes) - 1)), times, boxes)
 
 
 def _in_box(label: str, values: Array, halves: Array) -> Panel:
@@ -89,9 +89,9 @@ def sets_figure(plan: ProvenPlan) -> Figure:
     corners[:, moved] = path.sequence.points[:, : len(moved)]
     obstacles = [(np.array(o["points_m"]), o["radius_m"]) for o in sets.about["obstacles"]]
     size, title = (5.0 * max(len(views), 2), 5.6), plan.titled("Proven sets and the path")
-    figure = bare_figure(size, title)
+    figure, places = panels(len(views), len(views), size, title)
     with styled():
-        for axes, view in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        for axes, view in zip(places, views, strict=True):
             across, up = view
             _draw_boxes(
                 axes, sets.lower[:, view], sets.upper[:, view],
@@ -131,9 +131,9 @@ def sets_over_time_figure(plan: TimedPlan) -> Figure:
     times, points = plan.track
     sets = plan.sets
     title = plan.titled("Sets of poses and time")
-    figure = bare_figure((9.0, 2.4 * len(sets.axes) + 1.4), title)
+    size = (9.0, 2.4 * len(sets.axes) + 1.4)
+    figure, places = panels(len(sets.axes), 1, size, title, share_x=True)
     with styled():
-        places: Any = figure.subplots(len(sets.axes), 1, sharex=True, squeeze=False)[:, 0]
         for k, (axes, number) in enumerate(zip(places, sets.axes, strict=True)):
             low, high = sets.lower[:, k], sets.upper[:, k]
             first, last = np.array(sets.times).T
@@ -167,9 +167,8 @@ def space_time_figure(plan: TimedPlan) -> Figure:
     R = plan.motion.pose(0.0).rotation().matrix()
     gaps = moving_clearances(plan.around, plan.things, instants, p, np.repeat(R[None], PLACES, 0))
     hit = (np.min(gaps, axis=2) <= plan.sets.about["clearance_m"]).T
-    figure = bare_figure((9.0, 5.0), plan.titled("The way in space and time"))
+    figure, axes = new_figure(1, 1, (9.0, 5.0), plan.titled("The way in space and time"))
     with styled():
-        axes = figure.subplots()
         axes.pcolormesh(
             instants, places, np.where(hit, 1.0, np.nan), cmap="Greys", vmin=0.0, vmax=2.2,
             shading="nearest", rasterized=True,

@@ -8,15 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydrake.geometry import (
-    Meshcat,
-    MeshcatVisualizer,
-    MeshcatVisualizerParams,
-    Rgba,
-    Role,
-    SceneGraph,
-    Sphere,
-)
+from pydrake.geometry import Meshcat, Rgba, Role, SceneGraph, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -25,22 +17,17 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.visualization.replay import (
     BYTES_EACH,
-    CLOCK,
     FEWEST_FRAMES,
     LARGEST_PAGE,
     REPLAY_RATE,
     UNHELD,
+    RecordedScene,
     fitting_page,
     frame_indices,
     look_at,
     sampled_rows,
 )
-from cdpr_drake.analyses.visualization.replay_page import (
-    frame_signals,
-    packed,
-    tension_curves,
-    with_notes,
-)
+from cdpr_drake.analyses.visualization.replay_page import frame_signals, packed, tension_curves
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.geometry.cable_routes import CableRoutes
@@ -52,17 +39,15 @@ from cdpr_drake.palette import OUTLINE, rgb
 from cdpr_drake.systems.monitoring.meshcat_cables import THIN, CableChains
 
 
-class MechanismScene:
+class MechanismScene(RecordedScene):
     """A mechanism in Meshcat that can be posed, with its cables.
 
     Cables are drawn from point to point, without pulleys, as straight ones.
 
     Attributes:
-        meshcat: Where it is shown.
         plant: Its plant, with a SceneGraph.
         routes: Its cables.
         plant_context: Of the plant; its positions are drawn.
-        problem: Why the cables are grey, in one line; empty where their tensions are known.
     """
 
     def __init__(self, mechanism: Mechanism, meshcat: Meshcat) -> None:
@@ -73,13 +58,10 @@ class MechanismScene:
         """
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-        self.meshcat, self.plant, self.problem = meshcat, plant, ""
         added = add_mechanism(plant, mechanism)
         added.finalize()
-        params = MeshcatVisualizerParams(publish_period=1.0 / CLOCK)  # of recordings alone
-        self._visualizer = MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat, params)
-        self._diagram = builder.Build()
-        self._context: Context = self._diagram.CreateDefaultContext()
+        super().__init__(meshcat, builder, scene_graph.get_query_output_port())
+        self.plant = plant
         self.plant_context: Context = plant.GetMyMutableContextFromRoot(self._context)
         self.routes = added.routes()
         self._corners = _corners(plant, scene_graph)
@@ -122,8 +104,7 @@ class MechanismScene:
             Which cables are slack, shape (m,), bool.
         """
         assert self._chains is not None
-        self._context.SetTime(time or 0.0)
-        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+        self.publish(time)
         points, first = self.points(), self.routes.first
         curves = [points[:, first[i] : first[i + 1]] for i in range(self.routes.count)]
         slack = np.asarray(tensions <= 0.0)
@@ -131,10 +112,6 @@ class MechanismScene:
         for path, point in zip(self._point_paths(), points.T, strict=True):
             self.meshcat.SetTransform(path, RigidTransform(point), time)
         return slack
-
-    def start_recording(self) -> None:
-        """From now on, `draw` with a time writes into the recording."""
-        self._visualizer.StartRecording(set_transforms_while_recording=False)
 
     def html(self) -> str:
         """The scene as one page that needs no server."""
@@ -230,7 +207,7 @@ def write_mechanism_replay(
 
     def html(scene: MechanismScene, **signals: Any) -> str:
         names, exits = scene.routes.names, scene.exits()
-        return with_notes(scene.html(), names, exits, full_scale, title=title, **signals)
+        return scene.page(names, exits, full_scale, title=title, **signals)
 
     def page(most: int) -> tuple[str, int]:
         moving = scene()
@@ -244,8 +221,6 @@ def write_mechanism_replay(
             moving.plant.SetPositions(moving.plant_context, positions[frame])
             slack[frame] = moving.draw(tensions[frame], float(time))
             exits.append(moving.exits().T)
-        moving.meshcat.StopRecording()
-        moving.meshcat.PublishRecording()
         frames = frame_signals(log, shown, slack)
         frames["places"] = packed(np.array(exits), np.float32)
         moving.plant.SetPositions(moving.plant_context, positions[0])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 
 from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
@@ -81,12 +81,50 @@ FRUSTUM = 0.05
 """Depth of the drawn view of a camera, of the diagonal of the robot's frame."""
 
 
-class RobotPicture:
-    """A robot in Meshcat that can be posed, with its scene and cables.
+class RecordedScene:
+    """A Diagram in Meshcat that can be posed, recorded and written as a page.
 
     Attributes:
         meshcat: The Meshcat that shows it.
         problem: Why the cables are grey, in one line; empty where their tensions are known.
+    """
+
+    def __init__(self, meshcat: Meshcat, builder: DiagramBuilder, geometry: OutputPort) -> None:
+        """Builds the Diagram, whose query object is the output `geometry`."""
+        self.meshcat, self.problem = meshcat, ""
+        params = MeshcatVisualizerParams(publish_period=1.0 / CLOCK)  # of recordings alone
+        self._visualizer = MeshcatVisualizer.AddToBuilder(builder, geometry, meshcat, params)
+        self._diagram = builder.Build()
+        self._context: Context = self._diagram.CreateDefaultContext()
+
+    def publish(self, time: float | None = None) -> None:
+        """Draws the bodies where the context has them, at a time of a recording [s]."""
+        self._context.SetTime(time or 0.0)
+        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+
+    def start_recording(self) -> None:
+        """From now on, what is drawn with a time goes into the recording."""
+        self._visualizer.StartRecording(set_transforms_while_recording=False)
+
+    def page(
+        self, names: Sequence[str], exits: Array, full_scale: float, *, frames: Any = None,
+        **notes: Any,
+    ) -> str:  # fmt: skip
+        """The scene as one page that needs no server; arguments as of `with_notes`.
+
+        With frames it has the recording, which ends.
+        """
+        if frames is not None:
+            self.meshcat.StopRecording()
+            self.meshcat.PublishRecording()
+        html = self.meshcat.StaticHtml()
+        return with_notes(html, names, exits, full_scale, frames=frames, **notes)
+
+
+class RobotPicture(RecordedScene):
+    """A robot in Meshcat that can be posed, with its scene and cables.
+
+    Attributes:
         title: Of its page.
     """
 
@@ -107,17 +145,13 @@ class RobotPicture:
             colors: Of cables that are not slack, #rrggbb; None: by their tensions.
             look: True to look at the robot; else the view stays.
         """
-        self.meshcat = open_meshcat() if meshcat is None else meshcat
-        self.problem, self.title = "", "" if scenario is None else scenario.title
+        self.title = "" if scenario is None else scenario.title
         builder = DiagramBuilder()
         self._block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
-        self._visualizer = MeshcatVisualizer.AddToBuilder(
-            builder, self._block.GetOutputPort("query_object"), self.meshcat,
-            MeshcatVisualizerParams(publish_period=1.0 / CLOCK),  # of recordings alone
-        )  # fmt: skip
-        self._diagram = builder.Build()
-        self._context: Context = self._diagram.CreateDefaultContext()
-        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+        super().__init__(
+            meshcat or open_meshcat(), builder, self._block.GetOutputPort("query_object")
+        )
+        self.publish()
         for path in transparent_paths(self._block.scene_graph.model_inspector()):
             see_through(self.meshcat, path)
         if cables is None and scenario is not None:
@@ -140,9 +174,8 @@ class RobotPicture:
         """
         self._known = not np.all(np.isnan(tensions))
         plant = self._block.plant
-        self._context.SetTime(time or 0.0)
         self._block.in_plant.set_pose(plant.GetMyMutableContextFromRoot(self._context), X_WP)
-        self._visualizer.ForcedPublish(self._visualizer.GetMyContextFromRoot(self._context))
+        self.publish(time)
         self.cables.draw(X_WP, tensions, time, unstrained_lengths)
 
     def show_trace(self, name: str, points: Array, look: Look) -> None:
@@ -170,22 +203,15 @@ class RobotPicture:
         """Shows what is neither robot nor world, where frames are W, for a `ThingMover`."""
         self._lines += show_things(self.meshcat, things, self._depth)
 
-    def start_recording(self) -> None:
-        """From now on, `draw` with a time writes into the recording."""
-        self._visualizer.StartRecording(set_transforms_while_recording=False)
-
     def html(self, **signals: Any) -> str:
         """The scene as one page that needs no server, with its recording if there is one.
 
         Args:
             signals: Frames, curves and camera of the recording, for `with_notes`.
         """
-        if signals:
-            self.meshcat.StopRecording()
-            self.meshcat.PublishRecording()
-        return with_notes(
-            self.meshcat.StaticHtml(), [cable.name for cable in self._robot.cables],
-            self._robot.cable_set().p_WA, self._full_scale, title=self.title, lines=self._lines,
+        names, exits = [cable.name for cable in self._robot.cables], self._robot.cable_set().p_WA
+        return self.page(
+            names, exits, self._full_scale, title=self.title, lines=self._lines,
             known=self._known, **signals,
         )  # fmt: skip
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -41,25 +39,6 @@ POSES = "poses"
 
 PoseArrays = Callable[[int, int], Mapping[str, np.ndarray]]
 """Arrays by name, whose first index counts the poses start to stop of a grid."""
-
-
-@contextmanager
-def grid_folder(
-    folder: Path | str | None, arguments: Mapping[str, Any], name: str, overwrite: bool,
-    follow: Follow,
-) -> Iterator[Folder | None]:  # fmt: skip
-    """The results folder of a grid; None if nothing is kept.
-
-    Without a path it is one below `follow.results`, which the same arguments give again.
-    """
-    if folder is None and follow.results is not None:
-        digest = hashlib.sha256(json.dumps(arguments, sort_keys=True).encode()).hexdigest()
-        folder = follow.results / f"{name}-{digest[:8]}"
-    if folder is None:
-        yield None
-        return
-    with Folder(Path(folder), arguments, overwrite, grows=True) as results:
-        yield results
 
 
 def run_grid(

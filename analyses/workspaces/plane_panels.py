@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
+from cdpr_drake.analyses.frame.figures import panels, plain_numbers
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import OUTLINE
@@ -31,7 +31,7 @@ BORDERED_CELLS = 32
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 
 
-class Panels(NamedTuple):
+class Planes(NamedTuple):
     """A figure with axes for each of the chosen planes along the normal axis, and what of the robot
     is drawn there, for the legend."""
 
@@ -74,20 +74,20 @@ def draw_regions(
             linewidth=0.5,
         )  # fmt: skip
 
-    panels = draw_planes(grid, title, paint, robot, most=most, parts=parts)
+    planes = draw_planes(grid, title, paint, robot, most=most, parts=parts)
     patches = [Patch(facecolor=color, label=label) for color, label in colors.items() if label]
-    panels.figure.legend(
-        handles=[*patches, *panels.handles], loc="outside lower center", title_fontsize=10,
-        ncols=columns[len(panels.axes) > 2],
+    planes.figure.legend(
+        handles=[*patches, *planes.handles], loc="outside lower center", title_fontsize=10,
+        ncols=columns[len(planes.axes) > 2],
         title="Each point of the grid colours the cell around it.",
     )  # fmt: skip
-    return panels.figure
+    return planes.figure
 
 
 def draw_planes(
     grid: WorkspaceGrid, title: str, paint: Paint, robot: Robot | None = None, *, most: int,
     columns: int = 4, width: float = 3.0, parts: Array | None = None,
-) -> Panels:  # fmt: skip
+) -> Planes:  # fmt: skip
     """Draws planes of a grid, horizontal ones unless the grid has one point along x or y only.
 
     Args:
@@ -119,11 +119,10 @@ def draw_planes(
     extents = upper - lower
     wide, high = extents * (width if columns > 1 else 5.6) / np.max(extents)
     size = max(1.4 + (wide + 0.3) * columns, 6.5), 2.4 + (high + 0.4) * rows
-    figure, axes = new_figure(rows, columns, size, title)
+    figure, axes = panels(len(chosen), columns, size, title)
     # Panels of fixed proportions come closer to their neighbours than the layout knows.
     figure.set_layout_engine("constrained", w_pad=0.1, h_pad=0.12)
-    panels: list[Axes] = list(np.ravel(axes))
-    for number, (panel, k) in enumerate(zip(panels, chosen, strict=False)):
+    for number, (panel, k) in enumerate(zip(axes, chosen, strict=True)):
         paint(panel, edges, lambda values, k=k: np.take(values, k, normal).T)  # type: ignore[misc]
         if robot is not None:
             _draw_robot(panel, robot, (u, v), edges)
@@ -142,10 +141,8 @@ def draw_planes(
         panel.tick_params(labelleft=first, labelbottom=lowest, labelsize=10)
         panel.set_ylabel(f"{'xyz'[v]} in W [m]" if first else "")
         panel.set_xlabel(f"{'xyz'[u]} in W [m]" if lowest else "")
-    for panel in panels[len(chosen) :]:
-        panel.remove()
-    handles = [] if robot is None else list(panels[0].get_legend_handles_labels()[0])
-    return Panels(figure, panels[: len(chosen)], chosen, normal, handles)
+    handles = [] if robot is None else list(axes[0].get_legend_handles_labels()[0])
+    return Planes(figure, axes, chosen, normal, handles)
 
 
 def plane_axes(counts: Sequence[int]) -> tuple[int, int, int]:

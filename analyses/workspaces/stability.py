@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
+from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -34,7 +35,6 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.workspaces.grid_runs import (
     GridResult,
-    grid_folder,
     grid_words,
     load_grid,
     region_numbers,
@@ -306,7 +306,7 @@ def assess_stability(
         "grid": grid_arguments(poses), "case": servo.case, "statics": held,
     })  # fmt: skip
     title = f"{loaded.name}-{scheme}-{verdict}"
-    with grid_folder(folder, arguments, title, overwrite, follow) as results:
+    with results_folder(title, arguments, folder, overwrite, follow.results, grows=True) as results:
         if results is not None and reused(results, follow):
             return replace(load_stability(results.path), robot=loaded).written(
                 results, formats, follow

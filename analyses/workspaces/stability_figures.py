@@ -14,7 +14,7 @@ from cdpr_drake.analyses.frame.figures import (
     bare_figure,
     few_ticks,
     line_style,
-    new_figure,
+    panels,
 )
 from cdpr_drake.analyses.visualization.solids import draw_solid
 from cdpr_drake.analyses.workspaces.plane_panels import draw_regions
@@ -110,11 +110,10 @@ def curves_figure(stability: Stability) -> Figure:
         "deg": [name for name in points_of if name.startswith("d_theta")],
     }
     groups = {unit: parameters for unit, parameters in groups.items() if parameters}
-    figure, grid = new_figure(
-        1, len(groups), (6.5 * len(groups) + 0.5, 5.2),
-        _about(stability, "Size of the workspace against bounds of the perturbations"),
-    )  # fmt: skip
-    for axes, (unit, parameters) in zip(np.ravel(grid), groups.items(), strict=True):
+    title = _about(stability, "Size of the workspace against bounds of the perturbations")
+    size = (6.5 * len(groups) + 0.5, 5.2)
+    figure, grid = panels(len(groups), len(groups), size, title)
+    for axes, (unit, parameters) in zip(grid, groups.items(), strict=True):
         for parameter in parameters:
             values, names = zip(*points_of[parameter], strict=True)
             look = look_of(parameter, list(points_of))  # few have colours far from each other

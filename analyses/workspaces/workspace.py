@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeAlias
 import numpy as np
 from cyclopts import Parameter
 
+from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -48,7 +49,7 @@ from cdpr_drake.analyses.workspaces.conditions import (
     PoseConditions,
     conditions_at,
 )
-from cdpr_drake.analyses.workspaces.grid_runs import grid_folder, reused, run_grid
+from cdpr_drake.analyses.workspaces.grid_runs import reused, run_grid
 from cdpr_drake.analyses.workspaces.pose_grid import (
     Grid,
     Orientations,
@@ -234,7 +235,7 @@ def compute_workspace(
         "scenario": scenario or "",
     })  # fmt: skip
     title = f"{loaded.name}-{kinds[0] if len(kinds) == 1 else f'{len(kinds)}-kinds'}"
-    with grid_folder(folder, arguments, title, overwrite, follow) as results:
+    with results_folder(title, arguments, folder, overwrite, follow.results, grows=True) as results:
         ends = cast = None
         if hull is not None:
             follow.progress(Progress("casting rays", 0.0, rays, unit="rays"))

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.frame.figures import line_style, new_figure
+from cdpr_drake.analyses.frame.figures import line_style, new_figure, panels
 from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
 from cdpr_drake.analyses.workspaces.plane_panels import (
     CORNERS,
@@ -115,18 +115,18 @@ def _measure_figure(workspace: Workspace, measure: str) -> Figure:
         if min(cells.shape) >= LEAST_CONTOURED and np.ptp(limits) > 0.0:
             _contours(axes, points, cells, limits)
 
-    panels = draw_planes(
+    drawn = draw_planes(
         workspace.grid, _title(workspace, measure), paint, workspace.robot, most=MOST_PLANES
     )
     about = MEASURES[measure]
-    panels.figure.colorbar(meshes[-1], ax=panels.axes, label=f"{about.title} [{about.unit}]")
-    handles: list[Artist] = [*panels.handles]
-    if np.any(np.isnan(np.take(values, panels.chosen, panels.normal))):
+    drawn.figure.colorbar(meshes[-1], ax=drawn.axes, label=f"{about.title} [{about.unit}]")
+    handles: list[Artist] = [*drawn.handles]
+    if np.any(np.isnan(np.take(values, drawn.chosen, drawn.normal))):
         words = "outside" if inside.any() else "no number"
         handles.insert(0, Patch(facecolor=OUTSIDE, label=words))
     if handles:
-        panels.figure.legend(handles=handles, loc="outside lower center", ncols=4)
-    return panels.figure
+        drawn.figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return drawn.figure
 
 
 def breaks_figure(workspace: Workspace) -> Figure:
@@ -153,7 +153,7 @@ def breaks_figure(workspace: Workspace) -> Figure:
         + (f", first of {turns} orientations" if turns > 1 else "")
         + f"\nsurvived at {np.mean(workspace.holds[SURVIVES]):.0%} of the poses"
     )
-    panels = draw_planes(
+    drawn = draw_planes(
         workspace.grid, title, paint, most=BREAK_PLANES, columns=BREAK_COLUMNS, width=3.6
     )
     handles: list[Patch | Line2D] = [
@@ -165,11 +165,11 @@ def breaks_figure(workspace: Workspace) -> Figure:
                label=f"best: {name}")
         for name, marker in zip(about["reactions"], MARKERS, strict=False)
     ]  # fmt: skip
-    panels.figure.legend(
+    drawn.figure.legend(
         handles=handles, loc="outside lower center", ncols=3, title_fontsize=10,
         title="Number: the cable whose break is worst. Symbol: the best reaction to it.",
     )  # fmt: skip
-    return panels.figure
+    return drawn.figure
 
 
 def _draw_break(
@@ -229,10 +229,11 @@ def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
     wide = [k for k in range(3) if low[k] < high[k]]
     planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
     words = wrap(f"{robot}: poses proven {', '.join(kinds)}", LINE)
-    figure, grid = new_figure(1, len(planes), (1.0 + 3.6 * len(planes), 4.8), "\n".join(words))
+    size = (1.0 + 3.6 * len(planes), 4.8)
+    figure, grid = panels(len(planes), len(planes), size, "\n".join(words))
     # A pose of a border is in several boxes: a little off the middle, where no cut is.
     at = middle + 1e-6 * (high - low)
-    for axes, normal in zip(np.ravel(grid), planes, strict=True):
+    for axes, normal in zip(grid, planes, strict=True):
         u, v = (k for k in range(3) if k != normal)
         others = [k for k in range(boxes.poses.shape[1]) if k not in (u, v)]
         hit = np.all(np.abs(boxes.poses - at)[:, others] <= boxes.halves[:, others] + 1e-12, axis=1)
@@ -240,13 +241,7 @@ def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
             numbers = np.flatnonzero(hit & (boxes.verdicts == verdict))
             sizes = 2.0 * boxes.halves[numbers][:, np.newaxis, (u, v)]
             cells = lower[numbers][:, np.newaxis, (u, v)] + sizes * CORNERS[:4]
-            look: Any = {
-                "facecolor": color,
-                "edgecolor": "#555555",
-                "linewidth": 0.1,
-                "hatch": hatch,
-            }
-            axes.add_collection(PolyCollection(list(cells), **look))
+            axes.add_collection(PolyCollection(cells, facecolor=color, hatch=hatch, **EDGES))
         axes.set(xlim=(low[u], high[u]), ylim=(low[v], high[v]), aspect="equal")
         axes.set(xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
         axes.grid(False)
@@ -292,13 +287,13 @@ def wrench_set_figure(wrenches: AvailableWrenches, at: Array, title: str) -> Fig
         title: Title of the figure.
     """
     if len(wrenches.row_scale) == 6:
-        panels = [(3, 4), (3, 5), (4, 5), (0, 1), (0, 2), (1, 2)]
+        pairs = [(3, 4), (3, 5), (4, 5), (0, 1), (0, 2), (1, 2)]
         names = ["m_x", "m_y", "m_z", "f_x", "f_y", "f_z"]
     else:
-        panels, names = [(1, 2), (0, 1), (0, 2)], ["m_z", "f_x", "f_y"]
+        pairs, names = [(1, 2), (0, 1), (0, 2)], ["m_z", "f_x", "f_y"]
     units = [f"${name}$ [{'N m' if name[0] == 'm' else 'N'}]" for name in names]
-    figure, grid = new_figure(-(-len(panels) // 3), 3, (11.0, 4.2 * -(-len(panels) // 3)), title)
-    for axes, rows in zip(np.ravel(grid), panels, strict=True):
+    figure, grid = panels(len(pairs), 3, (11.0, 1.4 * len(pairs)), title)
+    for axes, rows in zip(grid, pairs, strict=True):
         corners = wrenches.section(rows, at)
         if len(corners):
             axes.fill(*corners.T, facecolor=INSIDE, alpha=0.35, edgecolor=INSIDE, linewidth=1.5)

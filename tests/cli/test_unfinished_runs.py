@@ -324,7 +324,7 @@ PLAN = ("plan", "planar", "--no-track", "--stations", "40", "--out", "plan", "--
 def test_a_plan_that_ends_while_its_figures_are_drawn_is_made_again(here, monkeypatch, capsys):
     whole = "0,0,0.3;0.02,0,0.3"
     with monkeypatch.context() as patch:
-        patch.setattr("cdpr_drake.analyses.planning.plans.figure_writers", end_at_once)
+        patch.setattr("cdpr_drake.analyses.frame.figures.figure_writers", end_at_once)
         for _ in range(2):  # and nothing piles up beside it
             with pytest.raises(Ended):
                 ended(*PLAN, whole)

@@ -107,16 +107,15 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, settings, 
     assert not (out / "design").exists()
     with (out / "judged.jsonl").open("a") as file:
         file.write('["set0-gener')  # as a kill leaves it
-    design = kept(out, settings)
-    again = design.search
+    again = kept(out, settings)
     assert again.complete
     assert again.earlier == 6
     assert np.array_equal(again.values, whole.values)
     assert np.array_equal(again.coordinates, whole.coordinates)
-    goals = evaluate_goals(load_robot(str(design.file)), again.judging, again.names)
+    goals = evaluate_goals(load_robot(str(again.file)), again.judging, again.names)
     assert goals == pytest.approx(again.values[again.best])
     if settings.search == "evolution":
-        more = kept(out, replace(settings, generations=4)).search
+        more = kept(out, replace(settings, generations=4))
         assert len(more.values) == designs + 4
         assert more.earlier == designs
 
@@ -153,12 +152,12 @@ def test_several_goals_and_sets_of_cables_make_a_front(tmp_path):
     sets = ["C1,C2,C3,C4,C5,C6,C7", "C1,C3,C5,C7"]
     goals = ("static", "speed", "cables")
     design = kept(tmp_path / "out", small(*goals, winches=True, cables=sets, generations=1))
-    assert set(design.search.sets.tolist()) == {0, 1}
+    assert set(design.sets.tolist()) == {0, 1}
     assert len(design.plot("pareto").axes) == 2
     results = json.loads((tmp_path / "out" / "results.json").read_text())
-    assert len(results["front"]) == len(design.search.front) >= 1
+    assert len(results["front"]) == len(design.front) >= 1
     rows = (tmp_path / "out" / "designs.csv").read_text().splitlines()
-    assert len(rows) == 1 + len(design.search.values)
+    assert len(rows) == 1 + len(design.values)
 
 
 def test_confirmation_proves_less_than_the_grid_says():

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.design.candidates import Mirror, MovedPoints
-from cdpr_drake.analyses.design.search import climb, evolve, pareto_front
+from cdpr_drake.analyses.design.design_result import pareto_front
+from cdpr_drake.analyses.design.search import climb, evolve
 from cdpr_drake.errors import DesignError
 
 REACH = np.full((3, 4), 0.1)

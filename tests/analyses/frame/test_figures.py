@@ -1,6 +1,8 @@
 """Figures: thinned curves keep every extreme, files have the same bytes every day."""
 
 import re
+import subprocess
+import sys
 import weakref
 import xml.etree.ElementTree as ElementTree
 
@@ -262,3 +264,21 @@ def test_curves_without_a_look_can_be_told_apart_without_colours():
     lines = [axes.plot([0.0, 1.0])[0] for _ in range(8)]
     assert len({line.get_color() for line in lines}) == 8
     assert len({str(line._unscaled_dash_pattern) for line in lines}) == 8
+
+
+IMPORTS = """
+import sys
+from importlib import import_module
+from cdpr_drake.cli.commands import COMMANDS
+modules = {command.verb.partition(":")[0] for command in COMMANDS.values()}
+planning = {f"cdpr_drake.analyses.planning.{name}" for name in ("free_plan", "proven_plan")}
+for module in sorted(modules | planning):
+    if ".analyses." in module:
+        import_module(module)
+        assert "matplotlib" not in sys.modules, module
+"""
+
+
+def test_verbs_are_imported_without_matplotlib():
+    """It takes half a second, which a verb that draws nothing needs not."""
+    subprocess.run([sys.executable, "-c", IMPORTS], check=True)

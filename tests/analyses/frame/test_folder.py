@@ -21,6 +21,7 @@ from cdpr_drake.analyses.frame.folder import (
     free_folder,
     is_locked,
     read_marker,
+    results_folder,
 )
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
 from cdpr_drake.errors import OutputFolderError
@@ -209,6 +210,29 @@ def test_differences_name_each_place():
         "seed is 1 there, 2 here", "points[1] is 2 there, 3 here", "old is true there, not here",
         "new is not there, another here",
     ]  # fmt: skip
+
+
+def place(name, arguments, results, folder=None, grows=False):
+    """Where a verb keeps what it computes; None if it keeps nothing."""
+    with results_folder(name, arguments, folder, False, results, grows) as opened:
+        if opened is not None:
+            opened.write_text("numbers.txt", "1")
+            opened.complete()
+        return opened and opened.path
+
+
+def test_a_verb_keeps_results_in_a_new_folder_or_in_that_of_its_arguments(tmp_path):
+    results, named = tmp_path / "workspaces", tmp_path / "mine"
+    assert place("robot", WANTED, None) is None
+    assert place("robot", WANTED, None, named) == named
+    new = [place("plans/robot", WANTED, results) for _ in range(2)]
+    assert new == [tmp_path / "plans" / name for name in ("robot", "robot-2")]
+    first, again, other = (
+        place("robot", arguments, results, grows=True)
+        for arguments in (WANTED, WANTED, {"seed": 7})
+    )
+    assert first == again != other
+    assert first.parent == other.parent == results
 
 
 WRITER = """

@@ -8,7 +8,7 @@ import pytest
 from cdpr_drake.cli.app import main
 from tests.messages import printed
 
-WRITES = "cdpr_drake.analyses.planning.plans.figure_writers"
+WRITES = "cdpr_drake.analyses.frame.figures.figure_writers"
 
 
 @pytest.fixture
