@@ -98,6 +98,7 @@ def test_figures_that_fail_cost_nothing_else(here, tracked, capsys):
     code, _, err = run(capsys, *ASKED, *SIGMA)
     assert code == 3
     assert "calibration.png: not written: [Errno 28]" in err
+    assert "The data is complete in out" in err
     assert {path.name for path in (here / "out").iterdir()} >= {"robot.yaml", "results.json"}
     assert not list((here / "out").rglob("*png*"))
 

@@ -81,18 +81,6 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, capsy
         assert word in words
 
 
-@pytest.mark.usefixtures("no_room_for_pictures")
-def test_figures_that_fail_cost_nothing_else(tmp_path, logs, capsys):
-    out = tmp_path / "out"
-    code, said, err = run(capsys, *identify(logs[0], out), "--json")
-    assert code == 3
-    assert json.loads(said) == json.loads((out / "identification.json").read_text())
-    assert load_robot(str(out / "robot.yaml"))
-    assert "validation.png: not written: [Errno 28]" in err
-    assert "The data is complete" in err
-    assert not [path for path in out.rglob("*") if "png" in path.name]
-
-
 def spoiled(kind):
     time, poses, tensions = log(span=4.0, **NOISE)
     if kind == "still":

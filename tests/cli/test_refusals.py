@@ -124,8 +124,6 @@ REFUSED = {
         ("acrobot_large --wrench 0,0,0,1,0,0 --force 1,0,0", "--wrench, --force: found both"),
         ("acrobot_large --limits 5,2", "lower <= upper"),
         ("acrobot_large --mass=-1", "--mass: found -1"),
-        ("acrobot_large --method kernel", "redundancy m - n = 2"),
-        ("acrobot_large --method reference_program", "no reference"),
         ("acrobot_large --plot no/such/x.png", "cannot be written"),
         ("planar --plot polygon=x.png", "found 'polygon'; accepted: tensions, wrenches"),
         ("nowhere.yaml", "nowhere.yaml"),
@@ -137,8 +135,6 @@ REFUSED = {
         ("cable_arm --joint=[] --joint=elbow=1", "--joint: found '[]'; accepted: name=value"),
         ("planar --held none --yields pose", "--yields, --held: found with a robot with one"),
         ("acrobot_large --lengths 1,1,1,1,1,1,1,-1", "--lengths: found -1; accepted: > 0"),
-        ("acrobot_large --pose 0,0,5", "outside the frame"),
-        ("acrobot_large --pose 0.5,0.5,1.1", "reaches into the platform"),
         ("acrobot_large --pose 0.5,0,0.5", "no tensions within 0..60 N"),
         ("acrobot_large --lengths .2,.2,.2,.2,.2,.2,.2,.2", "is stretched by 5"),
         ("planar --lengths .6,.6,.6,.6", "no pose in the frame has them"),
@@ -217,11 +213,9 @@ REFUSED = {
         ("planar --pieces 0", "pieces", "found 0", "at least 1"),
     ],
     "study": [
-        *((f"{name} --quick --workers {NOBODY}", NOBODY)
-          for name in ("worked-examples", "workspaces", "case-9")),
+        (f"worked-examples --quick --workers {NOBODY}", NOBODY),
         *((f"fusion --quick --out r {option} {value}", option, value) for option, value in (
-            ("--seeds", "5:5"), ("--seeds", "-1"), ("--seeds", "0"), ("--seeds", "1000000000000"),
-            ("--workers", "0"), ("--workers", "-3"))),
+            ("--seeds", "5:5"), ("--seeds", "1000000000000"), ("--workers", "0"))),
     ],
     "reproduce": [
         ("--only , --out r", "accepted"),
@@ -233,7 +227,6 @@ REFUSED = {
         ("log.csv --out x.csv --plot x", "x: found the ending ''; accepted: png"),
         ("log.csv --out x.csv --plot no/x.png", "there is no folder no"),
         ("log.csv --out x.csv --rate -5", "--rate: found '-5'; accepted: above 0"),
-        ("log.csv --out x.csv --from 5", "found no rows from 5 s; accepted: a part"),
         ("log.csv --out x.csv --unit mm", "accepted: DIMENSION=UNIT, as length=mm"),
         ("log.csv --out x.csv --every 0", "--every: found '0'; accepted: a whole number, at least"),
         ("empty.csv --out x.csv", "empty.csv: found an empty file; accepted: a log"),

@@ -20,12 +20,8 @@ from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
 from cdpr_drake.analyses.reporting.written_files import DRAWING, others_in
 from cdpr_drake.analyses.simulation import log_keeper, run_loop
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.schema.yaml_files import load_yaml
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.files import scenario_kind
-from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
 from tests.cli.commands import answer, ended, killed_after, refuse, run
 from tests.cli.conftest import only
 from tests.cli.test_calibrate_camera import BOARD, LENS, K
@@ -157,26 +153,6 @@ def test_a_run_that_is_interrupted_goes_on_in_its_folder(capsys, here, monkeypat
     (parts / CHECKPOINT).unlink()
     assert "holds no checkpoint" in refuse(capsys, *asked)
     assert ended("simulate", "--finish", "damaged") == 0
-
-
-@pytest.mark.parametrize(
-    ("scenario", "changes"),
-    [
-        ("acrobot_computed_torque", ()),
-        ("acrobot_friction", ("integration.engine=plant", "camera.kind=projected",
-                              "winches.mode=position")),
-        ("acrobot_sensors", ("camera.kind=projected", "estimator.kind=fusion")),
-        ("acrobot_mobile_robot", ("integration.loop=compiled", "tension_management.rate=512")),
-        ("acrobot_sensors", (
-            "integration.loop=compiled", "camera.kind=projected", "camera.latency_frames=1",
-            "estimator.kind=fusion", "sensors.log=[tension, encoder, tracker]",
-        )),
-    ],
-)  # fmt: skip
-def test_other_runs_go_on_too(here, scenario, changes):
-    kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    wanted = load_scenario(scenario, [*changes, "duration=0.3"])
-    assert_it_goes_on_to_the_same_bytes(kind, wanted, here, until=0.15)
 
 
 def full_disk(monkeypatch, after):

@@ -186,7 +186,9 @@ def test_a_camera_s_target_gets_to_other_processes():
     kinds = ("target-visible",)
     about = grid_conditions("acrobot_small", kinds, (), grid, "acrobot_pbvs")
     work = partial(conditions_at, about, grid, kinds)
-    here, there = (each(0, grid.size)[kinds[0]] for each in (work, pickle.loads(pickle.dumps(work))))
+    here, there = (
+        each(0, grid.size)[kinds[0]] for each in (work, pickle.loads(pickle.dumps(work)))
+    )
     np.testing.assert_array_equal(here, there)
     assert 0 < np.count_nonzero(here) < grid.size
 
