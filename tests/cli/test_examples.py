@@ -179,7 +179,7 @@ SAID = {
 SHORTER = {
     "adaptation": ["duration=5"],
     "pick_and_place": SHORT,
-    "tagless": ["duration=6", "camera.rate=8"],
+    "tagless": ["duration=8", "camera.rate=10"],
 }
 """Changes that make the runs of an example shorter."""
 
