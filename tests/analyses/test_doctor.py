@@ -4,7 +4,9 @@ import pytest
 
 from cdpr_drake.analyses import installation as doctor
 from cdpr_drake.errors import RenderingError
-from tests.cli.commands import told
+from cdpr_drake.kernel_cache.kernel_list import group_names
+from cdpr_drake.systems.scenarios.files import scenario_names
+from tests.cli.commands import run, told
 
 
 def test_this_machine_is_well(capsys):
@@ -43,3 +45,26 @@ def test_what_is_optional_and_absent_is_no_fault_but_named():
     finding = doctor._extra("no-such-package", "gym", "learning environments")
     assert finding.passed
     assert "pip install '.[gym]'" in finding.found
+
+
+def test_the_doctor_compiles_step_by_step(capsys, monkeypatch):
+    done = []
+    steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
+    monkeypatch.setattr("cdpr_drake.analyses.installation.compilation_steps", lambda: steps)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.default_workers", lambda: 1)
+    monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
+    found = told(capsys, "doctor", "--compile")
+    assert done == [group_names(), "one", "two"]
+    assert found["steps"] == [doctor.LISTED, "one", "two"]
+    assert found["wall_time_s"] >= 0.0
+    code, _, err = run(capsys, "doctor", "--compile")
+    assert (code, "Kernels are compiled and kept" in err) == (0, True)
+
+
+def test_steps_of_compilation_are_all_scenarios_and_both_engines_of_the_default():
+    names = [name for name, _ in doctor.compilation_steps()]
+    assert set(scenario_names()) < set(names)
+    assert {"tension methods", "acrobot_pbvs, compiled engine"} < set(names)
+    assert names[1] == "acrobot_pbvs"
+    dict(doctor.compilation_steps())["tension methods"]()
+    dict(doctor.compilation_steps())["acrobot_pbvs"]()

@@ -28,8 +28,7 @@ def only(*endings):
         return write_files(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        for module in (simulation,):
-            patch.setattr(module, "write_pictures", write)
+        patch.setattr(simulation, "write_pictures", write)
         patch.setattr(Folder, "write_all", write_all)
         yield
 

@@ -8,15 +8,10 @@ import sys
 from functools import cache
 from pathlib import Path
 from pkgutil import resolve_name
-from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
-from cdpr_drake.analyses.installation import LISTED, compilation_steps
-from cdpr_drake.analyses.visualization.robot_gallery import thumbnail
 from cdpr_drake.cli.commands import COMMANDS
-from cdpr_drake.kernel_cache.kernel_list import group_names
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_names
@@ -35,24 +30,13 @@ def test_the_package_is_a_command():
 def test_help_has_units_and_examples(capsys, monkeypatch, command):
     """The words of each argument reach the terminal as they stand in the verb's docstring."""
     monkeypatch.setenv("COLUMNS", "250")
-    code, said, _ = run(capsys, command, "--help")
-    words = " ".join(resolve_name(COMMANDS[command].verb).__doc__.partition("Raises:")[0].split())
+    code, out, _ = run(capsys, command, "--help")
+    said = " ".join(out.replace("│", " ").split())
+    docstring = inspect.getdoc(resolve_name(COMMANDS[command].verb))
+    arguments = " ".join(docstring.partition("Args:")[2].partition("Raises:")[0].split())
     assert code == 0
-    assert COMMANDS[command].line == words[: len(COMMANDS[command].line)]
-    assert set(re.findall(r"\[[^]\[]+?\]", words.rpartition("Args:")[2])) <= set(
-        re.findall(r"\[[^]\[]+?\]", " ".join(said.replace("│", " ").split()))
-    )
-    assert all(example in " ".join(said.split()) for example in COMMANDS[command].examples)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_help_has_units_of_the_docstring(capsys, monkeypatch, command):
-    monkeypatch.setenv("COLUMNS", "200")
-    _, said, _ = run(capsys, command, "--help")
-    words = inspect.getdoc(resolve_name(COMMANDS[command].verb))
-    arguments = words.partition("Args:")[2].partition("Raises:")[0]
-    for unit in re.findall(r"\[.+?\]", arguments):
-        assert unit in said
+    for words in (*re.findall(r"\[[^]\[]+?\]", arguments), *COMMANDS[command].examples):
+        assert words in said
 
 
 def test_units_reach_the_terminal(capsys):
@@ -150,44 +134,6 @@ def test_a_page_that_cannot_be_finished_leaves_nothing(capsys, monkeypatch, here
     assert "No space left" in refuse(capsys, *words)
     assert page.read_text() == "before"
     assert list(here.iterdir()) == [page]
-
-
-@pytest.mark.parametrize("name", ["caroca", "planar"])
-def test_a_thumbnail_has_all_cables_in_true_proportions(name):
-    robot = load_robot(name)
-    svg = ElementTree.fromstring(thumbnail(robot))
-    paths = [path for path in svg.iter("path") if path.get("class") == "cable"]
-    assert len(paths) == len(robot.cables)
-    ends = np.array([re.findall(r"-?\d+\.\d", path.get("d")) for path in paths], float)
-    if robot.is_planar():  # seen from above, so that lengths in the plane are to scale
-        cables, X_WP = robot.cable_set(), robot.home.transform()
-        true = np.linalg.norm(cables.p_WA - X_WP.multiply(cables.p_PB), axis=0)
-        drawn = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1)
-        np.testing.assert_allclose(drawn / drawn[0], true / true[0], rtol=0.01)
-    assert np.all((ends >= 0.0) & (ends <= 280.0))
-
-
-def test_the_doctor_compiles_step_by_step(capsys, monkeypatch):
-    done = []
-    steps = [(name, lambda name=name: done.append(name)) for name in ("one", "two")]
-    monkeypatch.setattr("cdpr_drake.analyses.installation.compilation_steps", lambda: steps)
-    monkeypatch.setattr("cdpr_drake.analyses.installation.default_workers", lambda: 1)
-    monkeypatch.setattr("cdpr_drake.analyses.installation.compile_needed", done.append)
-    found = told(capsys, "doctor", "--compile")
-    assert done == [group_names(), "one", "two"]
-    assert found["steps"] == [LISTED, "one", "two"]
-    assert found["wall_time_s"] >= 0.0
-    code, _, err = run(capsys, "doctor", "--compile")
-    assert (code, "Kernels are compiled and kept" in err) == (0, True)
-
-
-def test_steps_of_compilation_are_all_scenarios_and_both_engines_of_the_default():
-    names = [name for name, _ in compilation_steps()]
-    assert set(scenario_names()) < set(names)
-    assert {"tension methods", "acrobot_pbvs, compiled engine"} < set(names)
-    assert names[1] == "acrobot_pbvs"
-    dict(compilation_steps())["tension methods"]()
-    dict(compilation_steps())["acrobot_pbvs"]()
 
 
 def test_options_of_imported_logs_that_change_nothing_are_told(capsys, here):

@@ -10,53 +10,37 @@ from cdpr_drake.models.robot_loader import load_robot, robot_text
 from tests.cli.commands import answer, told
 
 PLACE = "0.1,0.05,0.3"
-WITH, WITHOUT = "with pulleys of 20 mm", "pulleys ignored"
+GRID = ("--grid", "0.1:0.1:1,0.05:0.05:1,0.3:0.3:1", "--workers", "1")
+COMMANDS = {
+    "tension": (f"--pose={PLACE}",),
+    "static": (f"--pose={PLACE}",),
+    "equilibria": ("--lengths", "L0", "--cable-model", "elastic", "--searches", "1"),
+    "workspace": (*GRID, "--out", "w"),
+    "stability": (*GRID, "--out", "s", "--verdict", "sampled", "--draws", "1"),
+    "plan": ("--waypoints", f"{PLACE};0.1,0.05,0.31", "--stations", "10", "--no-track",
+             "--out", "p"),
+}  # fmt: skip
+"""Words that ask for a pose, by their commands."""
 
 
 @pytest.fixture(scope="module")
 def wide(tmp_path_factory):
-    """ACROBOT over pulleys of 20 mm."""
+    """ACROBOT over pulleys of 20 mm: its file, and its lengths at rest."""
     text = yaml.safe_load(robot_text("acrobot_large"))
     text["name"], text["pulley"]["radius"] = "wide", 0.02
     path = tmp_path_factory.mktemp("robots") / "wide.yaml"
     path.write_text(yaml.safe_dump(text))
-    return str(path)
+    return str(path), ",".join(map(str, cdpr.solve_static(path).l0))
 
 
-def commands(robot, out):
-    """Command lines that ask for a pose, one for each command."""
-    l0 = ",".join(map(str, cdpr.solve_static(robot).l0))
-    grid = "--grid", "0.1:0.1:1,0.05:0.05:1,0.3:0.3:1"
-    return {
-        "tension": ("tension", robot, f"--pose={PLACE}"),
-        "static": ("static", robot, f"--pose={PLACE}"),
-        "equilibria": (
-            "equilibria", robot, "--lengths", l0, "--cable-model", "elastic", "--searches", "1",
-        ),
-        "workspace": ("workspace", robot, *grid, "--out", str(out / "w"), "--workers", "1"),
-        "stability": (
-            "stability", robot, *grid, "--out", str(out / "s"), "--verdict", "sampled",
-            "--draws", "1", "--workers", "1",
-        ),
-        "plan": (
-            "plan", robot, "--waypoints", "0.1,0.05,0.3;0.1,0.05,0.31", "--stations", "10",
-            "--no-track", "--out", str(out / "p"), "--overwrite",
-        ),
-    }  # fmt: skip
-
-
-NAMES = ("tension", "static", "equilibria", "workspace", "stability", "plan")
-
-
-@pytest.mark.usefixtures("without_pictures")
-@pytest.mark.parametrize("name", NAMES)
-def test_a_command_with_a_pose_names_its_geometry(name, wide, tmp_path, capsys):
-    for options, words in (((), WITH), (("--no-pulleys",), WITHOUT)):
-        out = tmp_path / words.replace(" ", "_")
-        out.mkdir()
-        line = commands(wide, out)[name]
-        assert words in " ".join(answer(capsys, *line, *options).split())
-        assert told(capsys, *line, *options)["geometry"].startswith(words)
+@pytest.mark.usefixtures("without_pictures", "here")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_command_with_a_pose_names_its_geometry(name, wide, capsys):
+    robot, lengths = wide
+    asked = [name, robot, *(lengths if word == "L0" else word for word in COMMANDS[name])]
+    more = ["--overwrite"] if "--out" in asked else []
+    for options, words in (([], "with pulleys of 20 mm"), (["--no-pulleys"], "pulleys ignored")):
+        assert words in " ".join(answer(capsys, *asked, *more, *options).split())
 
 
 @pytest.mark.parametrize("words", ["with pulleys of 4.5 mm", "no pulleys in the robot"])

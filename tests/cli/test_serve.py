@@ -44,10 +44,6 @@ def free_port():
         return one.getsockname()[1]
 
 
-def serve(*options):
-    return ended("serve", *options)
-
-
 def test_a_client_without_the_package(capsys, tmp_path):
     assert len(PLAIN_CLIENT.read_text().splitlines()) <= MOST_LINES
     assert "import cdpr" not in PLAIN_CLIENT.read_text().partition('"""\n\n')[2]
@@ -56,7 +52,7 @@ def test_a_client_without_the_package(capsys, tmp_path):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as client:
         more = ("--place", "controller", "--port", port, "--duration", "1", "--out", out)
         with only("error.png"):
-            code = serve(*SCENARIO, *more, "--json")
+            code = ended("serve", *SCENARIO, *more, "--json")
         said = client.communicate()[0]
     assert code == 0
     assert "'outcome': 'completed'" in said
@@ -100,7 +96,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
 
     thread = threading.Thread(target=drive)
     thread.start()
-    code = serve(*SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
+    code = ended("serve", *SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
     thread.join()
     err = printed(capsys).err
     summary = json.loads((out / "summary.json").read_text())
@@ -121,7 +117,9 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
 
 def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
     out = tmp_path / "out"
-    code = serve(*SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out))
+    code = ended(
+        "serve", *SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out)
+    )
     err = printed(capsys).err
     assert code == CLIENT_ENDED
     assert "open to other machines" in err
@@ -139,6 +137,6 @@ def test_a_signal_while_it_waits(capsys, tmp_path):
 
     thread = threading.Thread(target=ask_and_stop)
     thread.start()
-    assert serve(*SCENARIO, "--port", str(port), "--out", str(out)) == INTERRUPTED
+    assert ended("serve", *SCENARIO, "--port", str(port), "--out", str(out)) == INTERRUPTED
     thread.join()
     assert not out.exists()

@@ -10,27 +10,19 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame import words as argument_words
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
-from cdpr_drake.analyses.simulation.start_checks import limit_warnings, servo_limit_warnings
-from cdpr_drake.analyses.simulation.unexpected_end import slack_words, unexpected_end
 from cdpr_drake.cli.simulate import seeds_of
 from cdpr_drake.kernel_cache.kernel_list import needed_kernels
 from cdpr_drake.models import rendered_camera
-from cdpr_drake.models.mechanism_loader import load_mechanism
-from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd
+from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
-from tests.cli.commands import STORE, ended, killed_after, refuse, run, told
+from tests.cli.commands import STORE, answer, ended, killed_after, refuse, run, told
 from tests.cli.conftest import only
 from tests.newcomer import OWN_ROBOT
 from tests.record_kernels import kept_kernels
@@ -52,7 +44,8 @@ def test_it_writes_a_folder_and_prints_json(capsys, here):
 
 @pytest.mark.usefixtures("without_pictures")
 def test_without_out_it_numbers_its_folders_and_takes_overrides(capsys, here):
-    assert ended(*SHORT) == 0
+    # The end of a duration that was asked for is no timeout.
+    assert "acrobot_pbvs_taut: ended at 0.1 s, as asked" in answer(capsys, *SHORT)
     goal = ("--set", "desired.position=[0.1, 0, 0.09]")
     code, _, err = run(capsys, *SHORT, "--set", "controller.lambda_0=1.25", *goal)
     assert code == 0
@@ -62,54 +55,34 @@ def test_without_out_it_numbers_its_folders_and_takes_overrides(capsys, here):
     assert "lambda_0: 1.25" in text
 
 
-@pytest.mark.usefixtures("without_pictures")
-def test_overwrite_replaces_results_and_nothing_else(capsys, here):
-    (here / "out").mkdir()
-    (here / "out" / "old").write_text("")
-    asked = (*SHORT, "--out", "out", "--overwrite")
-    assert "did not write" in refuse(capsys, *asked)
-    assert (here / "out" / "old").exists()
-    (here / "out" / ".cdpr_drake.json").write_text("{}")
-    assert ended(*asked) == 0
-    assert not (here / "out" / "old").exists()
-
-
-def test_a_figure_that_fails_is_named_and_the_rest_is_kept(capsys, here, monkeypatch):
+def test_figures_have_the_formats_asked_for_and_one_that_fails_costs_no_other(
+    capsys, here, monkeypatch
+):
     def broken(result):
         raise RuntimeError("no font")
 
     monkeypatch.setattr("cdpr_drake.analyses.simulation.run_figures.error_figure", broken)
-    with only("error.png", "tensions.png", "replay.html"):
-        code, out, err = run(capsys, *SHORT, "--out", "out", "--json")
+    words = (*SHORT, "--out", "out", "--json", "--figure-format", "pdf,svg")
+    with only("error.pdf", "error.svg", "tensions.pdf", "tensions.svg", ".png", "replay.html"):
+        code, out, err = run(capsys, *words)
     assert code == 3
-    assert "error.png: not written: no font" in err
+    assert "error.pdf: not written: no font" in err
     assert json.loads(out)["outcome"] == "timeout"
-    names = {path.name for path in (here / "out").iterdir()}
-    assert {"summary.json", "log.npz", "replay.html", "tensions.png"} <= names
-    assert "error.png" not in names
+    names = os.listdir("out")
+    drawn = {name for name in names if name.endswith((".png", ".pdf", ".svg", ".html"))}
+    assert drawn == {"tensions.pdf", "tensions.svg", "replay.html"}
+    assert {"summary.json", "log.npz"} <= {*names}
 
 
-@pytest.mark.parametrize(
-    ("words", "formats"),
-    [("png", ("png",)), ("pdf,svg", ("pdf", "svg")), ("svg, PDF", ("svg", "pdf")),
-     ("png,png", ("png",))],
-)  # fmt: skip
-def test_formats_are_accepted_alone_and_together(words, formats):
-    assert tuple(argument_words.formats(words)) == formats
-
-
-@pytest.mark.parametrize("words", ["", "jpg", "png,", "png pdf", "../png", "png,eps"])
-def test_other_formats_are_refused_with_what_is_accepted(words, capsys):
-    said = refuse(capsys, "simulate", f"--figure-format={words}")
-    assert f"--figure-format: found {words!r}; accepted: png, pdf, svg" in said
-
-
-def test_figures_have_the_formats_asked_for(here):
-    words = ("simulate", "planar_pbvs", "--camera", "projected", "--duration", "0.1")
-    with only("tensions.pdf", "tensions.svg", ".png", "replay.html"):
-        assert ended(*words, "--out", "o", "--figure-format", "pdf,svg") == 0
-    figures = {name for name in os.listdir("o") if name.endswith((".png", ".pdf", ".svg", ".html"))}
-    assert figures == {"tensions.pdf", "tensions.svg", "replay.html"}
+def test_formats_alone_and_together_and_what_is_accepted(capsys):
+    for words, formats in (
+        ("png", ("png",)), ("pdf,svg", ("pdf", "svg")), ("svg, PDF", ("svg", "pdf")),
+        ("png,png", ("png",)),
+    ):  # fmt: skip
+        assert tuple(argument_words.formats(words)) == formats
+    for words in ("", "jpg", "png,", "png pdf", "../png", "png,eps"):
+        said = refuse(capsys, "simulate", f"--figure-format={words}")
+        assert f"--figure-format: found {words!r}; accepted: png, pdf, svg" in said
 
 
 def test_a_broken_graphics_driver_is_one_line(capsys, here, monkeypatch):
@@ -189,12 +162,6 @@ def test_ctrl_c_keeps_what_was_simulated(capsys, here, monkeypatch):
     assert summary["sim_time_s"] > 0.0
 
 
-@pytest.mark.usefixtures("without_pictures")
-def test_the_end_of_a_duration_that_was_asked_for_is_no_timeout(capsys, here, without_pictures):
-    words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--out", "o", "--duration", "0.1")
-    assert "acrobot_pbvs: ended at 0.1 s, as asked" in run(capsys, *words)[1]
-
-
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
     words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.6", *COMPILED)
     code, out, _ = run(capsys, *words, "--out", "out")
@@ -214,39 +181,6 @@ def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
     assert "cables were slack" in said
 
 
-@pytest.mark.parametrize(
-    ("expected", "outcome", "errors", "words"),
-    [
-        (None, Outcome.CONVERGED, (0.1, 0.1), ""),
-        (None, Outcome.COMPLETED, (0.1, 0.1), ""),
-        (None, Outcome.TIMEOUT, (0.0, 0.0), "ended by timeout"),
-        (None, Outcome.INTERRUPTED, (0.0, 0.0), ""),
-        (("timeout", None, None), Outcome.TIMEOUT, (0.1, 0.1), ""),
-        (("timeout", None, None), Outcome.CONVERGED, (0.0, 0.0), "expected timeout"),
-        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.002, 0.0), "2 mm, expected.position"),
-        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.0, 0.01), "0.573 deg, expected.rot"),
-        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.0005, 0.001), ""),
-    ],
-)
-def test_what_is_expected_decides(expected, outcome, errors, words):
-    scenario = load_scenario("acrobot_pbvs")
-    keys = ("outcome", "position", "rotation_deg")
-    end = None if expected is None else ExpectedEnd(**dict(zip(keys, expected, strict=True)))
-    found = " ".join(unexpected_end(replace(scenario, expected=end), outcome, errors))
-    assert words in found
-    assert bool(found) == bool(words)
-
-
-def test_slack_cables_are_named_the_longest_first():
-    slack = np.zeros((4, 8))
-    slack[0:1, 2], slack[0:3, 5] = 1.0, 1.0
-    log = {"time": np.array([0.0, 1.0, 3.0, 6.0]), "slack": slack}
-    robot = load_robot("acrobot_small")
-    names = [cable.name for cable in robot.cables]
-    assert slack_words(log, robot) == f"cables were slack: {names[5]} 6.0 s, {names[2]} 1.0 s"
-    assert slack_words({**log, "slack": 0.0 * slack}, robot) == ""
-
-
 TRACKING = """\
 kind: tension_control
 name: tracking
@@ -260,50 +194,32 @@ distribution: {limits: LIMITS}
 
 
 @pytest.mark.usefixtures("without_pictures")
-@pytest.mark.parametrize(
-    ("limits", "used", "said"),
-    [
-        ("[1.0, 60.0]", [1.0, 60.0], "distribution.limits = 1 to 60 N replace tension_bounds of "
-         "bay, 4 to 350 N"),
+def test_limits_that_replace_those_of_the_robot_are_said(capsys, here):
+    (here / "bay.yaml").write_text(OWN_ROBOT.read_text())
+    for limits, used, said in (
+        ("[1.0, 60.0]", [1.0, 60.0],
+         "distribution.limits = 1 to 60 N replace tension_bounds of bay, 4 to 350 N"),
         ("[4.0, 350.0]", [4.0, 350.0], ""),
         ("null", [4.0, 350.0], ""),
-    ],
-)  # fmt: skip
-def test_limits_that_replace_those_of_the_robot_are_said(capsys, here, limits, used, said):
-    (here / "bay.yaml").write_text(OWN_ROBOT.read_text())
-    (here / "tracking.yaml").write_text(TRACKING.replace("LIMITS", limits))
-    code, out, err = run(capsys, "simulate", "tracking.yaml", "--json", "--out", "out")
-    told = json.loads(out)
-    assert code == 0
-    assert told["tension_limits_n"] == used
-    assert bool(told["remarks"]) == bool(said)
-    assert all(said in words for words in told["remarks"])
-    assert ("replace tension_bounds" in err) == bool(said)
-    assert used[0] <= told["tension_n"]["min"] <= told["tension_n"]["max"] <= used[1]
+    ):  # fmt: skip
+        (here / "tracking.yaml").write_text(TRACKING.replace("LIMITS", limits))
+        asked = ("simulate", "tracking.yaml", "--json", "--out", "out", "--overwrite")
+        code, out, err = run(capsys, *asked)
+        found = json.loads(out)
+        assert (code, found["tension_limits_n"]) == (0, used)
+        assert bool(found["remarks"]) == bool(said)
+        assert all(said in words for words in found["remarks"])
+        assert ("replace tension_bounds" in err) == bool(said)
+        assert used[0] <= found["tension_n"]["min"] <= found["tension_n"]["max"] <= used[1]
 
 
-def test_limits_of_winches_by_torque_and_of_mechanisms_are_said():
-    scenario, robot = load_scenario("acrobot_torque_servo"), load_robot("acrobot_small")
-    (words,) = servo_limit_warnings(scenario, robot)
-    assert "torque_control.limits = 1 to 60 N replace tension_bounds of acrobot_small" in words
-    scenario.winches.mode = "velocity"  # which no limits hold
-    assert servo_limit_warnings(scenario, robot) == []
-    (words,) = limit_warnings("control.limits", np.array([0.0, 9.0]), load_mechanism("cable_arm"))
-    assert "control.limits = 0 to 9 N replace tension_bounds of cable_arm" in words
-
-
-@pytest.mark.parametrize(
-    ("words", "seeds"), [("0:3", [0, 1, 2]), ("5:6", [5]), ("4", [4]), ("3,5,8", [3, 5, 8])]
-)
-def test_seeds_as_spans_and_lists(words, seeds):
-    assert seeds_of(words) == seeds
-
-
-@pytest.mark.parametrize(
-    "words", ["", "3:3", "5:2", "1:2:3", "-1:2", "1,1", "a", "1.5", "0:9999999999", "9999999999"]
-)
-def test_other_seeds_are_refused(words, capsys):
-    assert "accepted: first:end" in refuse(capsys, "simulate", f"--seeds={words}")
+def test_seeds_are_spans_and_lists(capsys):
+    words = {"0:3": [0, 1, 2], "5:6": [5], "4": [4], "3,5,8": [3, 5, 8]}
+    assert {each: seeds_of(each) for each in words} == words
+    for each in (
+        "", "3:3", "5:2", "1:2:3", "-1:2", "1,1", "a", "1.5", "0:9999999999", "9999999999",
+    ):  # fmt: skip
+        assert "accepted: first:end" in refuse(capsys, "simulate", f"--seeds={each}")
 
 
 MANY = ("simulate", "--camera", "projected", "--workers", "1", "--seeds")

@@ -20,13 +20,9 @@ from cdpr_drake.analyses.front import simulation
 from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
 from cdpr_drake.analyses.reporting.written_files import DRAWING, others_in
 from cdpr_drake.analyses.simulation import log_keeper, run_loop
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.schema.yaml_files import load_yaml
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.scenarios.files import scenario_kind
-from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
-from tests.cli.commands import ended, killed_after, refuse, run
+from tests.cli.commands import answer, ended, killed_after, refuse, run
 from tests.cli.conftest import only
 from tests.cli.test_calibrate_camera import BOARD, LENS, K
 from tests.cli.test_identify import write
@@ -101,7 +97,8 @@ def test_a_run_that_is_killed_goes_on_to_the_same_bytes(capsys, killed, undistur
 
 
 @pytest.mark.usefixtures("without_pictures")
-def test_a_killed_run_is_found_by_the_next_and_can_be_finished(capsys, killed):
+def test_a_killed_run_can_be_finished_by_its_name_and_is_found_by_the_next(capsys, killed):
+    shutil.copytree(killed, "aside")
     code, _, err = run(capsys, *PROJECTED, "--duration", "0.1", "--out", "out")
     assert code == 0
     assert "--finish out-unfinished" in err
@@ -109,13 +106,8 @@ def test_a_killed_run_is_found_by_the_next_and_can_be_finished(capsys, killed):
     summary = json.loads((killed / "out-unfinished" / "summary.json").read_text())
     assert summary["message"] == "the program ended before the run did"
     assert summary["sim_time_s"] > 0.0
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_a_killed_run_can_be_finished_by_its_own_name(capsys, killed):
-    code, out, _ = run(capsys, "simulate", "--finish", "out")
-    assert code == 0
-    assert "out-unfinished" in out
+    os.chdir("aside")
+    assert "out-unfinished" in answer(capsys, "simulate", "--finish", "out")
 
 
 def interrupt_at(monkeypatch, sim_time):
@@ -163,26 +155,6 @@ def test_a_run_that_is_interrupted_goes_on_in_its_folder(capsys, here, monkeypat
     assert ended("simulate", "--finish", "damaged") == 0
 
 
-@pytest.mark.parametrize(
-    ("scenario", "changes"),
-    [
-        ("acrobot_computed_torque", ()),
-        ("acrobot_friction", ("integration.engine=plant", "camera.kind=projected",
-                              "winches.mode=position")),
-        ("acrobot_sensors", ("camera.kind=projected", "estimator.kind=fusion")),
-        ("acrobot_mobile_robot", ("integration.loop=compiled", "tension_management.rate=512")),
-        ("acrobot_sensors", (
-            "integration.loop=compiled", "camera.kind=projected", "camera.latency_frames=1",
-            "estimator.kind=fusion", "sensors.log=[tension, encoder, tracker]",
-        )),
-    ],
-)  # fmt: skip
-def test_other_runs_go_on_too(here, scenario, changes):
-    kind = SCENARIO_KINDS[scenario_kind(scenario)]
-    wanted = load_scenario(scenario, [*changes, "duration=0.3"])
-    assert_it_goes_on_to_the_same_bytes(kind, wanted, here, until=0.15)
-
-
 def full_disk(monkeypatch, after):
     """Lets the disk be full once the log has some rows."""
     monkeypatch.setattr(log_keeper, "MOST_ROWS", 10)
@@ -194,18 +166,6 @@ def full_disk(monkeypatch, after):
         append(self, rows)
 
     monkeypatch.setattr(LogOnDisk, "append", refused)
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_the_log_of_a_run_on_disk_is_that_of_one_in_memory(here, monkeypatch):
-    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 1e9)
-    for name, most in (("at_once", 10**9), ("in_pieces", 7)):
-        monkeypatch.setattr(log_keeper, "MOST_ROWS", most)
-        assert ended(*PROJECTED, "--duration", "0.2", "--out", name) == 0
-        assert not (here / name / PARTS).exists()
-    for file in ("log.npz", "log.csv"):
-        pieces = (here / "in_pieces" / file).read_bytes()
-        assert pieces == (here / "at_once" / file).read_bytes()
 
 
 @pytest.mark.parametrize("words", [PROJECTED, ("simulate", "acrobot_computed_torque")])

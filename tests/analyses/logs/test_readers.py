@@ -9,6 +9,7 @@ from cdpr_drake.analyses.front.logs import import_log
 from cdpr_drake.analyses.logs.clock_pairs import join_logs
 from cdpr_drake.analyses.logs.log_formats import LOG_READERS, detect_log, read_recorded
 from cdpr_drake.analyses.logs.log_request import LogRequest, axes_rotation, read_mapping
+from cdpr_drake.analyses.logs.motive import read_motive
 from cdpr_drake.errors import CdprError, LogFileError
 from tests.analyses.logs import recorders
 from tests.figure_faults import figure_faults
@@ -334,3 +335,14 @@ def test_columns_that_are_not_drawn_are_said(write):
     title = " ".join(figure.get_suptitle().split())
     assert title.endswith("not drawn: supply_voltage, aux0, aux1, aux2, aux3, aux4, aux5, aux6 "
                           "and 2 more")  # fmt: skip
+
+
+@pytest.mark.parametrize("lost", ["Position,Position,Position", "X,Y,Z,W", "Rotation,"])
+def test_a_motive_log_without_a_column_names_it(lost, tmp_path):
+    text = recorders.motive(40, units="Meters")
+    assert lost in text
+    file = tmp_path / "take.csv"
+    other = lost.replace("X", "W").replace("Pos", "Dis").replace("Rot", "Mot")
+    file.write_text(text.replace(lost, other, 1))
+    with pytest.raises(LogFileError, match="accepted"):
+        read_motive(file, LogRequest())

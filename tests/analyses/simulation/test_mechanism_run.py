@@ -24,7 +24,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
 from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
-from tests.cli.test_cli import refuse, run
+from tests.cli.commands import refuse, run
 
 RUN = "cdpr_drake.analyses.simulation.mechanism_run"
 ARM, BASES = "cable_arm_computed_torque", "mobile_bases_winches"

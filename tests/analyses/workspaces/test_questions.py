@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.studies.stability_recipe import recipe_case
-from cdpr_drake.analyses.workspaces.pose_grid import make_grid
+from cdpr_drake.analyses.workspaces.pose_grid import make_grid, spans
 from cdpr_drake.analyses.workspaces.servo_stability import robot_stability, scenario_view
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds, workspace_defaults
 from cdpr_drake.errors import BoundsFileError, CdprError
@@ -47,6 +47,8 @@ def test_every_robot_has_a_grid_and_bounds(name):
     wanted = PLANAR_BASELINE if robot.is_planar() else BASELINE
     np.testing.assert_allclose(bounds.radii(), wanted.radii(), rtol=RADII)
     assert grid_of(name).size > 1000
+    for words in ("1,1,1", "2,2,1" if robot.is_planar() else "2,2,2"):
+        assert make_grid(robot, name, spans(words)).size
 
 
 def test_a_robot_of_ones_own_gets_a_grid_in_its_frame(tmp_path):

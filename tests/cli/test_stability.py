@@ -9,14 +9,12 @@ import time
 
 import pytest
 
-from cdpr_drake.analyses.workspaces.pose_grid import make_grid, spans
 from cdpr_drake.analyses.workspaces.stability import CHUNK_POSES, load_stability
 from cdpr_drake.analyses.workspaces.stability_figures import curves, planes_figure
 from cdpr_drake.cli.following import STOPPING
-from cdpr_drake.models.robot_loader import load_robot
-from tests.cli.commands import STORE_ARRAYS, ended, killed_after, refuse, run, told
+from tests.cli.commands import STORE_ARRAYS, answer, ended, killed_after, refuse, run, told
+from tests.cli.conftest import only
 from tests.messages import messages
-from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
 SMALL = ("--verdict", "sampled", "--draws", "5", "--workers", "1")
 TINY = (*SMALL, "--grid", "3,3,3")
@@ -26,19 +24,29 @@ pytestmark = pytest.mark.usefixtures("here")
 
 
 def test_writes_a_folder_and_prints_json(capsys, here):
-    found = told(
-        capsys, "stability", "acrobot_small", *TINY, "--scheme", "ibvs", "--vary", "r_A=0.005,0.05",
-        "--orientation", "0,0,0", "--orientation", "0,0,20", "--out", "o", "--figure-format", "svg",
+    (here / "mine.yaml").write_text("r_A: 0.02\n")
+    asked = (
+        "stability", "acrobot_small", *TINY, "--scheme", "ibvs", "--orientation", "0,0,0",
+        "--orientation", "0,0,20", "--out", "o", "--figure-format", "svg", "--vary",
     )  # fmt: skip
+    found = told(capsys, *asked, "r_A=0.005,0.05")
     assert json.loads((here / "o" / "results.json").read_text()) == found
     assert [row["bounds"] for row in found["workspaces"]] == ["baseline", "r_A=0.005", "r_A=0.05"]
     assert found["workspaces"][0]["Z"]["of_poses"] == 2 * 27
+    assert found["interaction_matrix"] is None
     stored = load_stability(here / "o")
     assert stored.as_dict() == found
     assert [value for value, _ in curves(stored)["r_A"]] == [0.005, 0.05]
     names = os.listdir("o")
     assert {"planes.svg", "solids.svg", "volumes.svg", "workspace.html"} <= {*names}
     assert not [name for name in names if name.endswith(".png")]
+    # Bounds of a file are called given.
+    with only():
+        found = told(capsys, *asked, "r_A=0.01,0.03", "--bounds", "mine.yaml", "--overwrite")
+    assert [row["bounds"] for row in found["workspaces"]] == ["given", "r_A=0.01", "r_A=0.03"]
+    assert found["bounds"]["given"]["r_A"] == 0.02
+    values = [value for value, _ in curves(load_stability(here / "o"))["r_A"]]
+    assert values == [0.01, 0.02, 0.03]
 
 
 @pytest.mark.usefixtures("no_room_for_pictures")
@@ -54,26 +62,17 @@ def test_pictures_that_fail_cost_nothing_else(capsys, here):
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ("", "L_s with [s_t]x, exact"),
-        ("--printed-matrix", "L_s with [e_t]x, as (1.47) of the servoing thesis prints it"),
-        ("--scheme ibvs", None),
-    ],
-)
 @pytest.mark.usefixtures("without_pictures")
-def test_says_which_interaction_matrix_it_took(capsys, here, more, words):
-    asked = ("stability", "acrobot_large", *SMALL, "--grid", "2,2,2", *more.split())
-    code, out, _ = run(capsys, *asked, "--out", "o")
-    assert code == 0
-    found = json.loads((here / "o" / "results.json").read_text())
-    assert found["interaction_matrix"] == words
-    assert ("interaction matrix:" in out) == (words is not None)
-    title = planes_figure(load_stability(here / "o")).get_suptitle()
-    assert ("L_s" in title) == (words is not None)
-    if words is not None:
-        assert f"interaction matrix: {words}" in out
+def test_says_which_interaction_matrix_it_took(capsys, here):
+    for more, words in (
+        ((), "L_s with [s_t]x, exact"),
+        (("--printed-matrix",), "L_s with [e_t]x, as (1.47) of the servoing thesis prints it"),
+    ):
+        asked = ("stability", "acrobot_large", *SMALL, "--grid", "2,2,2", "--overwrite", *more)
+        assert f"interaction matrix: {words}" in answer(capsys, *asked, "--out", "o")
+        stored = load_stability(here / "o")
+        assert stored.as_dict()["interaction_matrix"] == words
+        title = planes_figure(stored).get_suptitle()
         # Its formulas are mathtext: $L_s$ with $[e_t]_\\times$; and it has several lines.
         assert words in " ".join(title.replace("$", "").replace("_\\times", "x").split())
 
@@ -84,12 +83,11 @@ def test_the_same_arguments_find_their_folder_again(capsys):
     assert code == 0
     assert "results: stability/planar-pbvs-sampled-" in out
     assert "reused the grid" not in err
-    assert "reused the grid of stability/planar-pbvs-sampled-" in run(capsys, *PLANAR)[2]
-    code, _, err = run(capsys, *PLANAR, "--searches", "9", "--pieces", "7")  # no numbers of these
-    assert (code, "reused the grid" in err) == (0, True)
+    # Searches and pieces make no numbers of sampled verdicts.
+    code, _, err = run(capsys, *PLANAR, "--searches", "9", "--pieces", "7")
+    assert (code, "reused the grid of stability/planar-pbvs-sampled-" in err) == (0, True)
     assert ended(*PLANAR, "--seed", "1") == 0
-    assert len(os.listdir("stability")) == 2
-    (folder, *_) = (f"stability/{name}" for name in os.listdir("stability"))
+    folder, _ = (f"stability/{name}" for name in os.listdir("stability"))
     assert "seed is" in refuse(capsys, *PLANAR, "--seed", "7", "--out", folder)
     assert ended(*PLANAR, "--seed", "7", "--out", folder, "--overwrite") == 0
 
@@ -126,8 +124,8 @@ def wait_until_none_is_left(group):
 @pytest.mark.usefixtures("without_pictures")
 def test_a_killed_sweep_continues_and_says_so(capsys, here, monkeypatch):
     (here / "killed.py").write_text(KILLED)
-    asked = ("stability", "acrobot_large", *SMALL[:-1], "2", "--grid", "5,5,3")
-    words = [sys.executable, "killed.py", *asked, "--out", "k"]
+    asked = ("stability", "acrobot_large", *SMALL, "--grid", "5,5,3")
+    words = [sys.executable, "killed.py", *asked, "--workers", "2", "--out", "k"]
     first = subprocess.Popen(words, start_new_session=True)
     assert first.wait() == -signal.SIGKILL
     wait_until_none_is_left(first.pid)  # its workers end with it
@@ -183,24 +181,3 @@ def test_ctrl_c_says_what_it_waits_for_and_a_second_one_drops_it(here):
     finally:
         process.kill()
         process.stderr.close()
-
-
-@pytest.mark.usefixtures("without_pictures")
-def test_bounds_of_a_file_are_called_given(capsys, here):
-    (here / "mine.yaml").write_text("r_A: 0.02\n")
-    asked = (*PLANAR, "--bounds", "mine.yaml", "--vary", "r_A=0.01,0.03", "--out", "o")
-    code, out, _ = run(capsys, *asked, "--json")
-    assert code == 0
-    found = json.loads(out)
-    assert [row["bounds"] for row in found["workspaces"]] == ["given", "r_A=0.01", "r_A=0.03"]
-    assert found["bounds"]["given"]["r_A"] == 0.02
-    assert "baseline" not in out
-    values = [value for value, _ in curves(load_stability(here / "o"))["r_A"]]
-    assert values == [0.01, 0.02, 0.03]
-
-
-@pytest.mark.parametrize("robot", REPRESENTATIVE_ROBOTS)
-def test_coarse_grids_of_every_robot_have_points_in_its_frame(robot):
-    loaded = load_robot(robot)
-    for words in ("1,1,1", "2,2,1" if loaded.is_planar() else "2,2,2", None):
-        assert make_grid(loaded, robot, None if words is None else spans(words)).size
