@@ -242,19 +242,20 @@ class Design(Result):
 
         assert self.best is not None
         figure, panels = new_figure(1, 2, (12.0, 5.5), f"{self.robot}: points moved")
-        before = self.candidates.present
-        after = self.candidates.robot(self.sets[self.best], self.coordinates[self.best])
+        design = self.candidates.robot(self.sets[self.best], self.coordinates[self.best])
+        present = self.candidates.present
+        before, after = present.cable_set(), design.cable_set()
         cables = list(self.candidates.cable_sets[self.sets[self.best]])
         for axes, kind, frame, old, new in (
-            (panels[0], "exit", "W", before.exit_points(), after.exit_points()),
-            (panels[1], "anchor", "P", before.anchor_points(), after.anchor_points()),
+            (panels[0], "exit", "W", before.p_WA, after.p_WA),
+            (panels[1], "anchor", "P", before.p_PB, after.p_PB),
         ):
             axes.plot(*old[:2], "o", markerfacecolor="none", color="black", label="robot as it is")
             axes.plot(*new[:2], "s", color=nth_look(0).color, markersize=5, label="best design")
             places: dict[tuple[float, ...], list[str]] = {}
             for k, i in enumerate(cables):
                 axes.plot(*np.array([old[:2, i], new[:2, k]]).T, "-", color="#707070", lw=1)
-                places.setdefault(tuple(old[:2, i].tolist()), []).append(before.cables[i].name)
+                places.setdefault(tuple(old[:2, i].tolist()), []).append(present.cables[i].name)
             for (x, y), names in places.items():
                 axes.annotate(
                     ", ".join(names), (x, y), textcoords="offset points",

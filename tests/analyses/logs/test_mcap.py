@@ -155,5 +155,5 @@ def test_what_cannot_be_is_said_in_one_line(run_folder, monkeypatch):
     with pytest.raises(OutputFormatError, match="time: found -1; accepted by mcap: >= 0"):
         write(folder)
     monkeypatch.setattr("cdpr_drake.analyses.logs.mcap_log.find_spec", lambda name: None)
-    with pytest.raises(LogFileError, match=r"pip install 'cdpr_drake\[mcap\]'"):
+    with pytest.raises(LogFileError, match=r"pip install '\.\[mcap\]'"):
         read_recorded(path)
