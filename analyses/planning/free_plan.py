@@ -291,8 +291,19 @@ def plan_free_motion(
         knots: Number of instants at which limits are checked.
         guess: File motion.csv of another plan between the same poses, such as a proven one, from
             which the solver starts; in Python also a path or motion.
-        limits, cable_speed, cable_acceleration, speed, reserve, pulleys: As of `plan_path`.
-        track, stream, stream_model, folder, overwrite, formats, follow: As of `plan_path`.
+        limits: Smallest and largest tension [N]; default: the robot's.
+        cable_speed: Largest cable speed [m/s]; default: at the motors' rated speed.
+        cable_acceleration: Largest cable acceleration [m/s^2]; default: no limit.
+        speed: Largest speed of Po [m/s]; default: no limit.
+        reserve: Share of every limit that is left for feedback.
+        pulleys: Take the robot's pulleys into account.
+        track: Also have the simulated robot track the plan at 1 kHz; default: if results are kept.
+        stream: Also compute cable lengths and motor angles at so many points a second [Hz].
+        stream_model: Cables of the stream: elastic or catenary; default: as the robot's sag.
+        folder: Results folder; default: plans/ROBOT, or ROBOT-2, ...; in Python nothing is kept.
+        overwrite: Replace earlier results in the folder.
+        formats: Formats of the figures in the folder.
+        follow: Who follows the work.
 
     Raises:
         PlanningError: No motion was found, or an argument is not accepted.

@@ -230,8 +230,8 @@ def plan_path(
 
     Args:
         robot: Robot by name or file.
-        path: Path through poses: a file, .csv of x,y,z[,phi,theta,psi] [m, deg] or G-code (lines,
-            arcs, feeds), or the poses themselves, at least two, with ; between them.
+        path: Path through poses: a file, .csv of x,y,z or x,y,z,phi,theta,psi [m, deg], or G-code
+            (lines, arcs, feeds), or the poses themselves, at least two, with ; between them.
         limits: Smallest and largest tension [N]; default: the robot's.
         cable_speed: Largest cable speed [m/s]; default: at the motors' rated speed.
         cable_acceleration: Largest cable acceleration [m/s^2]; default: no limit.

@@ -122,8 +122,19 @@ def plan_proven_motion(
             of convex sets, to compare; default: sequences.
         stations: Number of points of the path at which limits are checked.
         sets: Sets that were found before, instead of new ones.
-        limits, cable_speed, cable_acceleration, speed, reserve, pulleys: As of `plan_path`.
-        track, stream, stream_model, folder, overwrite, formats, follow: As of `plan_path`.
+        limits: Smallest and largest tension [N]; default: the robot's.
+        cable_speed: Largest cable speed [m/s]; default: at the motors' rated speed.
+        cable_acceleration: Largest cable acceleration [m/s^2]; default: no limit.
+        speed: Largest speed of Po [m/s]; default: no limit.
+        reserve: Share of every limit that is left for feedback.
+        pulleys: Take the robot's pulleys into account.
+        track: Also have the simulated robot track the plan at 1 kHz; default: if results are kept.
+        stream: Also compute cable lengths and motor angles at so many points a second [Hz].
+        stream_model: Cables of the stream: elastic or catenary; default: as the robot's sag.
+        folder: Results folder; default: plans/ROBOT, or ROBOT-2, ...; in Python nothing is kept.
+        overwrite: Replace earlier results in the folder.
+        formats: Formats of the figures in the folder.
+        follow: Who follows the work.
 
     Raises:
         PlanningError: The sets do not connect the poses, or an argument is not accepted.

@@ -78,6 +78,17 @@ VERBS = [
     if verb.startswith("cdpr_drake.analyses")
 ]  # fmt: skip
 
+
+@pytest.mark.parametrize(("verb", "name"), VERBS)
+def test_a_docstring_has_a_line_for_each_argument(verb, name):
+    function = resolve_name(verb)
+    missing = [
+        argument for argument in inspect.signature(function).parameters
+        if not re.search(rf"^ +{argument}: ", function.__doc__ or "", re.MULTILINE)
+    ]  # fmt: skip
+    assert missing == []
+
+
 SETTINGS = ("DesignSettings", "ProofSettings")
 """Public classes of settings: the schema of a file, and what `ProvenSets` are made with."""
 
