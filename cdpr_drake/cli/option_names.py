@@ -13,6 +13,7 @@ COMMAND_WORDS = {
     "cdpr_drake.models.load_mechanism": "a command that takes one, such as cdpr static",
     "cdpr_drake.systems.load_scenario": "a command that takes one, such as cdpr simulate",
     "camera.kind=projected": "--camera projected",
+    "plot": "--plot",
     "finish_run": "cdpr simulate --finish",
     "continue_run": "cdpr simulate --continue",
 }  # fmt: skip

@@ -124,3 +124,5 @@ def test_commands_stand_in_the_place_of_functions():
     options = parsed(["simulate", "acrobot_pbvs"]).options
     said = with_options("log.npz: found an end; finish_run makes results of it", options)
     assert said == "log.npz: found an end; cdpr simulate --finish makes results of it"
+    said = with_options("plot: found 'a'; accepted: tensions", options)
+    assert said == "--plot: found 'a'; accepted: tensions"
