@@ -434,7 +434,8 @@ class Fact(Entry):
             verdict = self._verdict(held, rows)
         except MissingRuns as lacking:
             held, verdict = [], unjudged or "not judged"
-            words = [f"runs are missing: {lacking}"] if str(lacking) else []
+            if str(lacking):
+                words = [f"runs are missing: {lacking}"]
         except Exception as problem:  # rows must not be lost
             held, verdict, words = [], "not judged", [f"judging failed: {problem}"]
         cause = "; ".join(f"{kind}: {reason}" for kind, reason in self.cause.items()) or "not known"
@@ -449,7 +450,7 @@ class Fact(Entry):
 
     def _verdict(self, held: Sequence[bool], rows: Frame) -> str:
         if not held:
-            raise MissingRuns(self.name)
+            raise MissingRuns  # the words say what rows there are
         if all(held):
             return GOOD[self.basis]
         some = any(held)
