@@ -233,7 +233,7 @@ class Part(Selection):
             is_so = f"`{self.of}` == {self.is_!r}"
             some = Selection(where=self.where, rows=self.rows, by=self.by, of=is_so)
             shares = some.values(rows)
-            words = ", ".join(f"{name} {100.0 * share:.0f} %" for name, share in shares.items())
+            words = ", ".join(f"{name} {100.0 * share:.3g} %" for name, share in shares.items())
             return self._taken([share == 1.0 for share in shares.values()]), f"{self.is_}: {words}"
         scale = FACTORS.get(self.unit, 1.0)
         numbers = {name: scale * value for name, value in self.values(rows).items()}
