@@ -121,7 +121,7 @@ def doubts(log: Mapping[str, Array], cables: Sequence[str]) -> list[str]:
             f"measurements at {parts['refused']:.0f} of {poses:.0f} poses contradict each other: "
             "these poses do not count"
         )
-    for row in np.flatnonzero(dropped > most):
+    for row in np.flatnonzero(dropped > most).tolist():
         corner, axis = divmod(row - len(cables), 2)
         words = f"corner {corner + 1} of the tag in {'uv'[axis]}"
         if row < len(cables):

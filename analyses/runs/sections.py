@@ -5,7 +5,7 @@ A `Section` row at the end of a subject lists them; see `Run.sections`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np

@@ -97,10 +97,10 @@ def _draw_distances(panel: Any, log: Any, name: str, across: Array) -> None:
     panel.set(xlabel="time [s]")
 
 
-def range_figures(run: Run) -> dict[str, Callable[[Run], Figure]]:
+def range_figures(run: Run) -> dict[str, Callable[[], Figure]]:
     """A figure for each range sensor."""
     sensors = run.scenario.sensors.range_sensors
-    return {f"scan_{sensor.name}": partial(scan_figure, sensor=sensor) for sensor in sensors}
+    return {f"scan_{sensor.name}": partial(scan_figure, run, sensor) for sensor in sensors}
 
 
 def scan_figure(run: Run, sensor: Any) -> Figure:

@@ -123,7 +123,7 @@ def stability_along(run: Run, threshold: float | None = None) -> Stability:
     return Stability(times, np.sum(~slack, axis=1).astype(float), rank, margin, criterion.freedom)
 
 
-def run_stability(run: Run) -> Stability | None:
+def stability_of_run(run: Run) -> Stability | None:
     """Stability along a run by its log, else, with tension management, computed from its poses.
 
     None otherwise, as to compute it takes longer than many a run.
