@@ -55,6 +55,8 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from cdpr_drake.analyses.visualization.live_view import Prepare
+
 PIECE = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
@@ -148,6 +150,10 @@ class Run(Result):
     @abstractmethod
     def subtitle(self) -> str:
         """What the run was, in a few words, below the titles of figures."""
+
+    def live(self, meshcat: Any) -> Prepare | None:
+        """What lets Meshcat follow it; None: nothing does."""
+        return None
 
     def log_names(self) -> dict[str, Sequence[str]]:
         """Names of cables, features, and the numbers of further quantities of the log."""

@@ -28,7 +28,7 @@ from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.unexpected_end import servo_message
-from cdpr_drake.analyses.visualization.live_view import live_servo
+from cdpr_drake.analyses.visualization.live_view import Prepare, live_servo
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
@@ -374,7 +374,8 @@ class ServoRun(Run):
         return facts
 
     def subtitle(self) -> str:
-        return f"{self.scenario.camera.kind} camera, seed {self.scenario.seed}"
+        geometry = self.scenario.cables.geometry_words(self.robot)
+        return f"{geometry}, {self.scenario.camera.kind} camera, seed {self.scenario.seed}"
 
     def main_figures(self) -> dict[str, Callable[[], Figure]]:
         curves = {
@@ -387,7 +388,7 @@ class ServoRun(Run):
             **{drawn.CABLE_CURVES[name][0]: draw for name, draw in curves.items()},
         }
 
-    def live(self, meshcat: Any) -> Any:
+    def live(self, meshcat: Any) -> Prepare:
         return live_servo(self.scenario, meshcat)
 
     def replay(self, path: Path) -> None:
