@@ -16,7 +16,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import drawing, write_pictur
 from cdpr_drake.analyses.reporting.left_folders import RESULTS
 from cdpr_drake.analyses.reporting.log_files import write_json
 from cdpr_drake.analyses.reporting.output_folder import results_folder
-from cdpr_drake.analyses.simulation.break_report import REACTIONS, after_break
+from cdpr_drake.analyses.runs.breaks import REACTIONS, after_break
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError, StoppedError

@@ -3,7 +3,7 @@
 ACROBOT with its large platform moves under a visual servo by motor torques.
 
 In the study `failure` one cable breaks at a time: every single cable, at several poses and speeds,
-and every reaction of `simulation.break_report`. If nobody knows, the controller goes on to ask the
+and every reaction of `runs.breaks`. If nobody knows, the controller goes on to ask the
 broken cable for its part, and to its goal, so that its way counts as excursion, too. The robot
 hangs: all exit points are above. At most poses seven of its cables hold it only if some of them may
 go slack, or not at all; column `holds` says whether tensions from zero to the upper limit balance
@@ -39,7 +39,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
-from cdpr_drake.analyses.simulation.break_report import (
+from cdpr_drake.analyses.runs.breaks import (
     BRAKE,
     NONE,
     REACTIONS,

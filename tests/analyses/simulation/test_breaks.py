@@ -7,9 +7,9 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation import break_survival
-from cdpr_drake.analyses.simulation.break_report import BRAKE, REDISTRIBUTE, STOP
-from cdpr_drake.analyses.simulation.break_survival import (
+from cdpr_drake.analyses.workspaces import break_survival
+from cdpr_drake.analyses.runs.breaks import BRAKE, REDISTRIBUTE, STOP
+from cdpr_drake.analyses.workspaces.break_survival import (
     CALM,
     BreakOutcomes,
     BreakRequest,

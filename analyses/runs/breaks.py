@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.reporting.log_on_disk import Log
+from cdpr_drake.analyses.runs.log import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_schema import Robot
@@ -45,7 +45,7 @@ REACTIONS = {
 """Section `emergency` of each reaction."""
 
 SAVING = (STOP, REDISTRIBUTE, BRAKING, RETREAT, DESCEND)
-"""Those that need neither a detector nor a goal of a servo, see `break_survival`."""
+"""Those that need neither a detector nor a goal of a servo, see `workspaces.break_survival`."""
 
 DEFAULT_SAVING = SAVING[:4]
 """Those of them that do not go to the ground."""

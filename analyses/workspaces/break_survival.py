@@ -7,7 +7,7 @@ calls, with what it reads known without error, and reactions act at the instants
 `EmergencyReaction` and `TorqueController` act in a diagram.
 
 A reaction saves the platform where no anchor point leaves the frame or goes into the ground, and
-the platform is at rest in the end, see `break_report`. Of a cable that reaction is best that saves
+the platform is at rest in the end, see `runs.breaks`. Of a cable that reaction is best that saves
 it and goes least far; where none does, that which goes least far.
 """
 
@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.break_report import (
+from cdpr_drake.analyses.runs.breaks import (
     BRAKE,
     BRAKING,
     DEFAULT_SAVING,
