@@ -234,7 +234,8 @@ class PickAndPlaceRun(Run):
         if views["hidden_s"] > 0.0:
             view += f"; a tag was hidden for {views['hidden_s']:.2f} s"
         return [
-            ("model", model_words(summary["simulated"])), ("set down", words), ("phases [s]", times), ("view", view),
+            ("model", model_words(summary["simulated"])), ("set down", words),
+            ("phases [s]", times), ("view", view),
             ("tensions", f"{tension['min']:.2f} to {tension['max']:.2f} N"),
         ]  # fmt: skip
 

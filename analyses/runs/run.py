@@ -226,6 +226,7 @@ class Run(Result):
             if "NaN" not in str(problem) and not engine.is_lost():
                 raise
             self.outcome, self.message = Outcome.DIVERGED, str(problem).splitlines()[0]
+        self.stopped = self.outcome == Outcome.INTERRUPTED
         self.wall_time = time.perf_counter() - began
         self.sim_time, self.log = engine.now(), recorder.finish()
         self.note(engine)
@@ -263,35 +264,38 @@ class Run(Result):
         self.message = "the program ended before the run did"
         return self
 
-    def write(
-        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS,
-        exports: Mapping[str, Callable[[Path], object]] | None = None, follow: Follow = NOBODY,
-    ) -> None:  # fmt: skip
-        """Writes log and summary, then figures, exports and replay, one of which spoils no other.
-
-        Args:
-            folder: The open folder, in which the log may have grown.
-            formats: Formats of figures.
-            exports: Further writers, by names of files.
-            follow: Who follows.
+    def write(self, folder: Folder) -> None:
+        """Writes log and summary.
 
         Raises:
-            OutputFolderError: Log or summary cannot be written.
+            OutputFolderError: They cannot be written.
         """
         write_log(folder, self.log, self.log_names())
         folder.write_json("summary.json", self.as_dict())
         self.folder = folder.path
-        pictures = {**(exports or {}), **figure_writers(self.figures(), formats)}
-        writers = {**pictures, "replay.html": self.replay}
 
-        def followed(name: str, path: Path) -> None:
-            follow.progress(
-                Progress(f"writing {name}", self.sim_time, self.scenario.duration, unit="s")
-            )
+    def draw(
+        self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS,
+        exports: Mapping[str, Callable[[Path], object]] | None = None, follow: Follow = NOBODY,
+    ) -> None:  # fmt: skip
+        """Writes figures, exports and replay, one of which spoils no other, see `failed`.
+
+        Args:
+            folder: The open folder, with log and summary.
+            formats: Formats of figures.
+            exports: Further writers, by names of files.
+            follow: Who follows; figures that are not begun when it stops are left out.
+        """
+        writers = {**(exports or {}), **figure_writers(self.figures(), formats)}
+        writers["replay.html"] = self.replay
+        duration = self.scenario.duration
+
+        def write(name: str, path: Path) -> None:
+            follow.progress(Progress(f"writing {name}", self.sim_time, duration, unit="s"))
             writers[name](path)
 
-        told = {name: partial(followed, name) for name in writers}
-        self.failed = folder.write_all(told, follow.stop)
+        failed = folder.write_all({name: partial(write, name) for name in writers}, follow.stop)
+        self.failed = {} if follow.stop() else failed
 
     def settle(self, folder: Folder) -> None:
         """Removes the log that grew: from now on `log` reads `log.npz`."""
@@ -377,12 +381,19 @@ class Run(Result):
         """What stopped it, and how to go on."""
         time, lines = f"{self.sim_time:g} s of simulated time", []
         if self.stopped:
-            lines.append(f"Interrupted at {time}; the same command goes on")
+            again = "the same command goes on"
+            if self.outcome == Outcome.INTERRUPTED and not self._has_checkpoint():
+                again = f"cdpr finish {self.folder} writes figures of it"
+            lines.append(f"Interrupted at {time}; {again}")
         elif self.outcome == Outcome.CLIENT_ENDED:
             lines.append(f"cdpr: the run ended at {time}: {self.message}")
         if self.failed:
             lines.append(f"The data is complete in {self.folder}")
         return lines
+
+    def _has_checkpoint(self) -> bool:
+        """True if the same command goes on from the end of the log, and does not begin anew."""
+        return isinstance(self.log, DiskLog) and (self.log.folder / CHECKPOINT).is_file()
 
     @property
     def exit_code(self) -> int:

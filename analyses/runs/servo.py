@@ -15,6 +15,9 @@ from pydrake.systems.analysis import SimulatorStatus
 
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.thinning import by_pieces
+from cdpr_drake.analyses.runs import sections as subjects
+from cdpr_drake.analyses.runs import servo_figures as drawn
+from cdpr_drake.analyses.runs.adaptation import LEARNT_POINTS
 from cdpr_drake.analyses.runs.checks import (
     check_length,
     check_start,
@@ -27,6 +30,8 @@ from cdpr_drake.analyses.runs.checks import (
 from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
+from cdpr_drake.analyses.runs.sensing import PAN_TILT, SENSING
+from cdpr_drake.analyses.runs.stability import STABILITY, Stability, stability_of_run
 from cdpr_drake.analyses.runs.unexpected_end import servo_message
 from cdpr_drake.analyses.visualization.live_view import Prepare, live_servo
 from cdpr_drake.analyses.visualization.replay import write_replay
@@ -111,12 +116,11 @@ class ServoRun(Run):
     Those that a run does not have, or that its log alone does not tell, are None.
     """
 
-    sections = () ; _ = ''' (
+    sections = (
         subjects.MOTORS, subjects.WANTED_TENSIONS, subjects.BEHAVIOUR, *SENSING,
         subjects.TENSION_GAIN, subjects.DISTURBANCES, subjects.FAILURES, subjects.WRENCH,
         LEARNT_POINTS, PAN_TILT, subjects.WORLD, STABILITY,
     )  # fmt: skip
-    '''
     broken = step_errors = depth_image = None
     images: tuple[int, int] | None = None
     torque: TorqueSteps | None = None
@@ -198,15 +202,15 @@ class ServoRun(Run):
         self.images, self.depth_image = built.images(context), built.depth_image(context)
         if torque is not None and built.tension_range is not None:
             own, watch = torque.GetMyContextFromRoot(context), built.tension_range
+            steps, relaxed = torque.steps(own)
             self.torque = TorqueSteps(
-                *torque.steps(own), torque.largest_rate(own),
+                steps, relaxed, torque.largest_rate(own),
                 watch.extremes(watch.GetMyContextFromRoot(context)),
                 tension_limits(self.scenario, built.robot),
             )  # fmt: skip
 
     def log_names(self) -> dict[str, Sequence[str]]:
-        from cdpr_drake.analyses.simulation.worlds import world_columns
-        world = world_columns(self.scenario.world)
+        world = subjects.world_names(self.scenario.world)
         return super().log_names() | {"error": self.built.feature_names} | world
 
     def end_error(self) -> tuple[float, float]:

@@ -24,6 +24,14 @@ from cdpr_drake.analyses.runs.checks import (
 from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine, resting
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
+from cdpr_drake.analyses.runs.sections import (
+    FORCES,
+    PROGRAM_STEPS,
+    WORLD,
+    world_facts,
+    world_names,
+    world_numbers,
+)
 from cdpr_drake.analyses.runs.unexpected_end import tension_message
 from cdpr_drake.analyses.visualization.cable_figures import cable_figure
 from cdpr_drake.analyses.visualization.live_view import Prepare, live_tension_control
@@ -247,7 +255,8 @@ class TensionRun(Run):
     def replay(self, path: Path) -> None:
         cables = CableSettings(model=ELASTIC, pulleys=self.scenario.cables.pulleys)
         write_replay(
-            path, self.robot, self.log, cables=cables, around=Surroundings(self.scenario.world), title=self.scenario.title,
+            path, self.robot, self.log, cables=cables, title=self.scenario.title,
+            around=Surroundings(self.scenario.world),
             limits=self.robot.tension_limits(self.scenario.limits()),
         )  # fmt: skip
 

@@ -42,9 +42,21 @@ _RUN, _FILES, _ANALYSE, _PLAN, _MACHINES, _STUDIES, _TOOLS = (
 
 COMMANDS = {
     "simulate": Command(
-        _RUN, f"{_CLI}.simulate:simulate",
+        _RUN, f"{_VERBS}.runs.simulate:simulate",
         "Simulates a scenario and writes summary, log, figures and replay.",
         ("cdpr simulate", "cdpr simulate caroca_ibvs --camera projected --seeds 0:20"),
+        {"seeds": (
+            f"{_CLI}.simulate:simulate",
+            "Simulates a scenario and writes summary, log, figures and replay.",
+        ), "compare-reactions": (
+            f"{_CLI}.simulate:simulate",
+            "Simulates a scenario and writes summary, log, figures and replay.",
+        )},
+    ),
+    "finish": Command(
+        _RUN, f"{_VERBS}.runs.simulate:finish_run",
+        "Writes log, summary and figures of a run that was interrupted, without going on.",
+        ("cdpr finish runs/acrobot_pbvs", "cdpr finish runs/acrobot_pbvs --video"),
     ),
     "serve": Command(
         _RUN, f"{_CLI}.serve:serve",
