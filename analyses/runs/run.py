@@ -176,7 +176,7 @@ class Run(Result):
     @cached_property
     def robot(self) -> Any:
         """The robot, or the mechanism."""
-        return load_robot(self.scenario.robot)
+        return self.built.robot
 
     @np.errstate(over="ignore", invalid="ignore")  # a run that diverges says so in its outcome
     def simulate(self, folder: Path | None = None, follow: Follow = NOBODY) -> Self:

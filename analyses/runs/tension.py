@@ -77,7 +77,7 @@ class TensionRun(Run):
     def built(self) -> TensionControl:
         """The diagram and its handles."""
         scenario = self.scenario
-        robot, belief = self.robot, scenario.perturbations.believed_robot
+        robot, belief = load_robot(scenario.robot), scenario.perturbations.believed_robot
         believed = robot if belief is None else load_robot(belief)
         damping = scenario.damping.of(robot) if belief is None else None
         dynamics = platform_dynamics(believed, damping=damping)

@@ -47,7 +47,7 @@ from cdpr_drake.analyses.runs.breaks import (
     STOP,
     after_break,
 )
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.break_detection import detectable_tension
@@ -106,7 +106,7 @@ def break_row(shift: int, time: float, cable: int, reaction: str) -> dict[str, A
         f"emergency={REACTIONS[reaction]}", f"duration={time + BREAK_AFTER:g}",
         f"log_rate={RATE:g}", "integration.engine=compiled",
     ])  # fmt: skip
-    run, robot = run_scenario(scenario), load_robot(scenario.robot)
+    run, robot = ServoRun(scenario).simulate(), load_robot(scenario.robot)
     numbers = after_break(run.log, robot, cable, time, scenario.cables.pulleys)
     return {"outcome": Outcome(run.outcome).name.lower(), **numbers}
 
@@ -300,7 +300,7 @@ def alarm_row(fails: str, which: int, number: int) -> dict[str, Any]:
         tension_n: the smallest reading before.
     """
     scenario = load_scenario(SCENARIO, alarm_changes(fails, which, number))
-    run = run_scenario(scenario)
+    run = ServoRun(scenario).simulate()
     log, times = run.log, run.log["time"]
     begins = np.inf if fails == NOTHING else fail_time(which, number)
     before = times < begins - 0.5 / RATE
