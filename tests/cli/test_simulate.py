@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import pytest
+from cdpr_drake.cli.simulate import seeds_of
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame import words as argument_words
 from cdpr_drake.analyses.simulation.log_keeper import LogKeeper
-from cdpr_drake.cli.simulate import seeds_of
 from cdpr_drake.kernel_cache.kernel_list import needed_kernels
 from cdpr_drake.models import rendered_camera
 from cdpr_drake.models.robot_loader import robot_file

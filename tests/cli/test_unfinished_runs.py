@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.front import simulation
-from cdpr_drake.analyses.reporting.log_on_disk import CHECKPOINT, PARTS, LogOnDisk
 from cdpr_drake.analyses.reporting.written_files import DRAWING, others_in
+from cdpr_drake.analyses.runs.log import CHECKPOINT, PARTS, DiskLog
 from cdpr_drake.analyses.simulation import log_keeper, run_loop
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.schema.yaml_files import load_yaml
@@ -35,7 +35,7 @@ PROJECTED = ("simulate", "acrobot_pbvs", "--camera", "projected")
 RUN = ("simulate", "acrobot_mobile_robot", "--log-rate", "25", "--duration", "1.0")
 KILLED = killed_after(
     4,
-    "cdpr_drake.analyses.reporting.log_on_disk.LogOnDisk.append",
+    "cdpr_drake.analyses.reporting.log_on_disk.DiskLog.append",
     "from cdpr_drake.analyses.simulation import log_keeper; log_keeper.CHECKPOINT_WAIT = 0.0",
 )
 """It has rows by then that came after its last checkpoint."""
@@ -158,14 +158,14 @@ def test_a_run_that_is_interrupted_goes_on_in_its_folder(capsys, here, monkeypat
 def full_disk(monkeypatch, after):
     """Lets the disk be full once the log has some rows."""
     monkeypatch.setattr(log_keeper, "MOST_ROWS", 10)
-    append = LogOnDisk.append
+    append = DiskLog.append
 
     def refused(self, rows):
         if self._rows >= after:
             raise OSError(errno.ENOSPC, "No space left on device")
         append(self, rows)
 
-    monkeypatch.setattr(LogOnDisk, "append", refused)
+    monkeypatch.setattr(DiskLog, "append", refused)
 
 
 @pytest.mark.parametrize("words", [PROJECTED, ("simulate", "acrobot_computed_torque")])

@@ -12,10 +12,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     robot_limits,
 )
-from cdpr_drake.analyses.simulation.tension_control_run import (
-    run_tension_scenario,
-    summarize_tension_run,
-)
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
@@ -44,7 +41,7 @@ def test_a_run(tmp_path):
     assert seen
     assert max(seen) <= 0.2
     scenario = load_scenario("planar_computed_torque", asked)
-    expected = summarize_tension_run(run_tension_scenario(scenario))
+    expected = TensionRun(scenario).simulate().as_dict()
     same = ("outcome", "sim_time_s", "position_error_m", "tension_n")
     assert {k: found.as_dict()[k] for k in same} == {k: expected[k] for k in same}
     assert found.log["tensions"].shape[1] == 4

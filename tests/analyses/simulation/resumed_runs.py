@@ -2,7 +2,7 @@
 
 import pytest
 
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS
+from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.analyses.simulation.session import RunSession
 
 
@@ -14,7 +14,7 @@ def assert_it_goes_on_to_the_same_bytes(kind, wanted, folder, until=0.25):
     """A run that was killed once its simulated time was over `until` [s], beside a whole one.
 
     Args:
-        kind: The kind of the scenario, of `SCENARIO_KINDS`.
+        kind: The kind of the scenario, of `KINDS`.
         wanted: The scenario.
         folder: Where it may keep its log.
         until: See above.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
@@ -79,7 +79,7 @@ def run_by_hand(name="acrobot_pbvs", *settings):
         "surplus_lengths": 0.01 * slack,
         "cable_velocities": rng.uniform(-0.1, 0.1, (4, m)),
     }
-    return RunResult(
+    return ServoRun(
         servo=servo, log=log, outcome=Outcome.TIMEOUT, message="slow", sim_time=3.5, wall_time=0.5
     )
 

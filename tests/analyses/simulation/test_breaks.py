@@ -7,15 +7,15 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.workspaces import break_survival
 from cdpr_drake.analyses.runs.breaks import BRAKE, REDISTRIBUTE, STOP
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.workspaces import break_survival
 from cdpr_drake.analyses.workspaces.break_survival import (
     CALM,
     BreakOutcomes,
     BreakRequest,
     breaks_at,
 )
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError, StoppedError, WorkspaceError
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -39,7 +39,7 @@ def test_it_is_what_runs_of_the_scenario_say(compared):
         *SHORT, f"failures.events=[{{kind: cable_breaks, time: {TIME}, cable: {CABLE}}}]",
         "emergency={reaction: stop, delay: 0.03}", f"duration={TIME + AFTER}", "log_rate=500",
     ])  # fmt: skip
-    log = run_scenario(scenario).log
+    log = ServoRun(scenario).simulate().log
     since = log["time"] > TIME - 1e-3
     way = np.linalg.norm(log["X_WP"][since, 4:] - log["X_WP"][since][0, 4:], axis=1)
     assert compared.rows["stop"]["excursion_m"] == pytest.approx(way.max(), rel=1e-9)

@@ -3,13 +3,9 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.tension_control_run import (
-    run_tension_scenario,
-    summarize_tension_run,
-)
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import robot_file
@@ -45,7 +41,7 @@ def by_both(run, name, *overrides):
     [("acrobot_pbvs", ()), ("acrobot_friction", ("winches.mode=position",)), ("planar_pbvs", ())],
 )
 def test_a_servo_takes_the_same_path(name, overrides):
-    plant, compiled, apart = by_both(run_scenario, name, PROJECTED, "duration=0.6", *overrides)
+    plant, compiled, apart = by_both(ServoRun, name, PROJECTED, "duration=0.6", *overrides)
     assert plant.outcome == compiled.outcome == Outcome.TIMEOUT
     assert np.max(np.ptp(plant.log["X_WP"][:, 4:], axis=0)) > 0.01
     assert apart < SAME_PATH
@@ -54,28 +50,26 @@ def test_a_servo_takes_the_same_path(name, overrides):
 
 def test_the_summary_names_engine_and_errors_and_a_run_repeats_byte_for_byte():
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, COMPILED, "duration=0.3"])
-    first, again = run_scenario(scenario), run_scenario(scenario)
+    first, again = ServoRun(scenario).simulate(), ServoRun(scenario).simulate()
     for name, values in first.log.items():
         assert values.tobytes() == again.log[name].tobytes()
-    summary = summarize(first)
+    summary = first.as_dict()
     assert summary["engine"] == "compiled"
     assert 0.0 < summary["step_error"]["m"] < 1e-4
-    plant = run_scenario(load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.1"]))
-    assert summarize(plant)["engine"] == "plant"
-    assert summarize(plant)["step_error"] is None
+    plant = ServoRun(load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.1"])).simulate()
+    assert plant.as_dict()["engine"] == "plant"
+    assert plant.as_dict()["step_error"] is None
 
 
 def test_a_rendered_camera_sees_the_platform_where_the_engine_has_it():
-    _, compiled, apart = by_both(
-        run_scenario, "acrobot_pbvs", "camera.kind=rendered", "duration=0.2"
-    )
+    _, compiled, apart = by_both(ServoRun, "acrobot_pbvs", "camera.kind=rendered", "duration=0.2")
     assert compiled.log["found"][-1, 0] == 1.0
     assert apart < SAME_PATH
 
 
 def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
     careful, stable = (
-        run_scenario(load_scenario("acrobot_pbvs", [PROJECTED, COMPILED, "duration=0.3", *more]))
+        ServoRun(load_scenario("acrobot_pbvs", [PROJECTED, COMPILED, "duration=0.3", *more])).simulate()
         for more in (["integration.accuracy=1e-8"],
                      ["integration.integrator=semi_implicit", "integration.max_step=0.01"])
     )  # fmt: skip
@@ -99,10 +93,10 @@ def test_what_an_engine_cannot_do_is_refused(overrides, words):
 
 def test_a_run_that_diverges_says_so():
     overrides = [PROJECTED, COMPILED, "integration.max_step=0.2", "duration=5"]
-    result = run_scenario(load_scenario("acrobot_pbvs", overrides))
+    result = ServoRun(load_scenario("acrobot_pbvs", overrides)).simulate()
     assert result.outcome == Outcome.DIVERGED
     assert "not finite" in result.message
-    assert summarize(result)["step_error"] is None
+    assert result.as_dict()["step_error"] is None
 
 
 def test_cables_that_break_are_found(tmp_path):
@@ -110,7 +104,7 @@ def test_cables_that_break_are_found(tmp_path):
     path = tmp_path / "acrobot_small.yaml"
     path.write_text(text.replace("cable:\n", "cable:\n  breaking_load: 4\n"))
     overrides = [PROJECTED, COMPILED, "duration=0.4", f"robot={path}", "stop.broken_cable=true"]
-    result = run_scenario(load_scenario("acrobot_pbvs", overrides))
+    result = ServoRun(load_scenario("acrobot_pbvs", overrides)).simulate()
     assert result.outcome == Outcome.CABLE_BROKEN
     assert np.any(result.broken > 0.0)
 
@@ -123,26 +117,24 @@ def test_the_plant_is_what_nobody_asked_otherwise():
 
 
 def test_commanded_tensions_lead_the_platform_the_same_way():
-    plant, compiled, apart = by_both(
-        run_tension_scenario, "acrobot_computed_torque", "duration=0.6"
-    )
+    plant, compiled, apart = by_both(TensionRun, "acrobot_computed_torque", "duration=0.6")
     assert apart < SAME_TENSIONS_PATH
     np.testing.assert_allclose(plant.log["lengths"], compiled.log["lengths"], atol=1e-12)
-    assert summarize_tension_run(compiled)["engine"] == "compiled"
+    assert compiled.as_dict()["engine"] == "compiled"
 
 
 def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_diagram(tmp_path):
     scenario = load_scenario("planar_computed_torque", ["duration=0.35", COMPILED])
-    loop = run_tension_scenario(scenario, RunSession(log_folder=tmp_path / "log"))
+    loop = TensionRun(scenario).simulate(RunSession(log_folder=tmp_path / "log"))
     seen = []
     look = RunSession(prepare=lambda _, built: seen.append(built))
-    diagram = run_tension_scenario(scenario, look)
-    assert seen[0] is diagram.control.diagram
+    diagram = TensionRun(scenario).simulate(look)
+    assert seen[0] is diagram.built.diagram
     assert loop.outcome == diagram.outcome == Outcome.COMPLETED
     assert loop.sim_time == diagram.sim_time == 0.35
     for name, values in diagram.log.items():
         np.testing.assert_allclose(loop.log[name], values, rtol=0.0, atol=1e-9)
-    one, other = (summarize_tension_run(run) for run in (loop, diagram))
+    one, other = (run.as_dict() for run in (loop, diagram))
     assert (one["loop"], other["loop"]) == ("compiled", "diagram")
     assert one["position_error_m"]["max"] == pytest.approx(other["position_error_m"]["max"])
 
@@ -150,8 +142,8 @@ def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_dia
 def test_a_compiled_loop_that_leaves_the_frame_ends_as_the_diagram_does():
     overrides = ["duration=8.0", COMPILED, "controller.rate=6"]
     scenario = load_scenario("acrobot_computed_torque", overrides)
-    loop = run_tension_scenario(scenario)
-    diagram = run_tension_scenario(scenario, RunSession(prepare=lambda *_: None))
+    loop = TensionRun(scenario).simulate()
+    diagram = TensionRun(scenario).simulate(RunSession(prepare=lambda *_: None))
     assert loop.outcome == diagram.outcome == Outcome.DIVERGED
     assert loop.sim_time == pytest.approx(diagram.sim_time)
     assert loop.message == diagram.message

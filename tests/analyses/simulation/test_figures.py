@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.simulation import adaptation_report, run_figures
 from cdpr_drake.analyses.simulation.hardware_figures import (
     motor_figure,
@@ -16,7 +17,6 @@ from cdpr_drake.analyses.simulation.hardware_figures import (
     reading_figure,
 )
 from cdpr_drake.analyses.simulation.perception_figures import looking_figures
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -45,7 +45,7 @@ SHORT = ("camera.kind=projected", "integration.engine=compiled")
 
 @pytest.fixture(scope="module")
 def result():
-    return run_scenario(load_scenario("planar_pbvs", [*SHORT, "duration=0.4"]))
+    return ServoRun(load_scenario("planar_pbvs", [*SHORT, "duration=0.4"])).simulate()
 
 
 def curves(of):
@@ -61,7 +61,7 @@ def test_axes_have_units(result, draw):
     assert figure_faults(figure) == []
     title = figure.get_suptitle()
     assert "planar_pbvs" in title
-    assert result.servo.scenario.title in title.replace("\n", " ")
+    assert result.built.scenario.title in title.replace("\n", " ")
     for axes in figure.axes:
         labels = [axes.get_ylabel()]
         if labels == ["slack cable"]:  # a row a cable, by their names
@@ -129,11 +129,11 @@ def test_every_run_has_its_figures_in_the_formats_asked_for(result):
 @pytest.fixture(scope="module")
 def run():
     overrides = [*SHORT, "duration=0.6", "winches.kind=motor"]
-    return run_scenario(load_scenario("acrobot_sensors", overrides))
+    return ServoRun(load_scenario("acrobot_sensors", overrides)).simulate()
 
 
 def test_errors_are_those_at_the_instant_of_the_reading(run):
-    settings = run.servo.scenario.sensors
+    settings = run.built.scenario.sensors
     vlu850 = load_tension_sensor("vlu850")
     _, error = reading_errors(run.log, settings, "tension")
     assert np.max(np.abs(error)) < vlu850.accuracy + 5.0 * vlu850.repeatability
@@ -163,8 +163,8 @@ def test_readings_are_one_period_old():
 
 
 def test_each_logged_sensor_has_a_panel(run):
-    settings = run.servo.scenario.sensors
-    figure = reading_figure("title", run.servo.robot, run.log, settings)
+    settings = run.built.scenario.sensors
+    figure = reading_figure("title", run.built.robot, run.log, settings)
     assert [a.get_ylabel().split(",")[0] for a in figure.axes] == [
         "tension", "length", "tracker", "metrology",
     ]  # fmt: skip
@@ -172,7 +172,7 @@ def test_each_logged_sensor_has_a_panel(run):
 
 
 def test_motors_have_their_torques_and_friction(run):
-    figure = motor_figure("title", run.servo.robot, run.log)
+    figure = motor_figure("title", run.built.robot, run.log)
     top, bottom = figure.axes
     assert (len(top.get_lines()), len(bottom.get_lines())) == (8, 10)
     assert "[N m]" in top.get_ylabel()

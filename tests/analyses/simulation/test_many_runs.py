@@ -12,18 +12,15 @@ import pytest
 from scipy.io import loadmat
 
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns, run_many, with_seeds
+from cdpr_drake.analyses.runs.seeds import METRICS, Repetition, run_many, statistics, with_seeds
 from cdpr_drake.analyses.simulation.monte_carlo_report import (
-    METRICS,
     repetition_figure,
     repetition_pictures,
     repetition_summary,
     repetition_table,
-    statistics,
     write_repetitions,
 )
 from cdpr_drake.analyses.simulation.monte_carlo_store import RunRecord, StoredRuns
-from cdpr_drake.analyses.simulation.run_summary import summarize
 from cdpr_drake.errors import InfeasibleTensionError, OutputFolderError, OutputFormatError
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -230,7 +227,7 @@ LABELS = {
 
 def test_metrics_are_numbers_of_a_run_and_named_in_words():
     assert {metric: label for metric, (label, _) in METRICS.items()} == LABELS
-    found = summarize(run_by_hand())
+    found = run_by_hand().as_dict()
     for metric in METRICS:
         key, _, inner = metric.partition(".")
         value = found[key][inner] if inner else found[key]
@@ -276,7 +273,7 @@ def hand():
         RunRecord(k, SEEDS[k], summary_of(k), poses[k], traces_of(k) if k < 2 else {})
         for k in range(3)
     ]
-    return ManyRuns(tuple(records), 5, 12.5, (7,))
+    return Repetition(tuple(records), 5, 12.5, (7,))
 
 
 @pytest.fixture(scope="module")
@@ -335,7 +332,7 @@ def test_repeatability_is_of_the_poses_that_converged(summary):
 
 
 def test_without_a_run_that_converged_there_is_none(scenario, hand):
-    failed = ManyRuns(hand.records[2:], 1, 1.0)
+    failed = Repetition(hand.records[2:], 1, 1.0)
     summary = repetition_summary(scenario, failed)
     assert summary["repeatability"] is None
     assert summary["interrupted"] is False
@@ -368,7 +365,7 @@ def test_the_table_shows_millimetres_and_degrees(summary):
 
 
 def test_a_table_of_nothing_says_so(scenario):
-    table = repetition_table(repetition_summary(scenario, ManyRuns((), 3, 0.1)))
+    table = repetition_table(repetition_summary(scenario, Repetition((), 3, 0.1)))
     assert table.title == "acrobot_pbvs: no run finished"
     assert list(table.columns[1].cells) == ["-"] * len(METRICS)
 
@@ -392,7 +389,7 @@ def test_files_hold_what_was_found(scenario, hand, summary, tmp_path):
 
 
 def test_the_figure_draws_paths_and_ends_in_millimetres(scenario, hand, tmp_path):
-    assert repetition_pictures(scenario, ManyRuns((), 3, 0.1)) == {}
+    assert repetition_pictures(scenario, Repetition((), 3, 0.1)) == {}
     assert write_pictures(tmp_path, repetition_pictures(scenario, hand)) == {}
     assert [path.name for path in tmp_path.iterdir()] == ["repetitions.png"]
     image, deviation, ends = repetition_figure(scenario, hand).axes

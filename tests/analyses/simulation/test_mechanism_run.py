@@ -7,17 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.runs.mechanism import MechanismRun
+from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.analyses.simulation import log_keeper
 from cdpr_drake.analyses.simulation.mechanism_figures import mechanism_pictures
-from cdpr_drake.analyses.simulation.mechanism_run import (
-    check_mechanism_run,
-    mechanism_end_error,
-    mechanism_facts,
-    run_mechanism_scenario,
-    summarize_mechanism_run,
-)
+from cdpr_drake.analyses.simulation.mechanism_run import check_mechanism_run, mechanism_facts
 from cdpr_drake.analyses.simulation.run_loop import advance
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -43,7 +38,7 @@ the same, and steps are cut at other places; found 2e-7."""
 
 
 def ran(name, *changes):
-    return run_mechanism_scenario(load_scenario(name, changes))
+    return MechanismRun(load_scenario(name, changes)).simulate()
 
 
 @pytest.fixture(scope="module")
@@ -63,19 +58,19 @@ def whole(tmp_path_factory):
 
 def test_an_arm_follows_by_computed_torque():
     done = ran(ARM)
-    summary = summarize_mechanism_run(done)
+    summary = done.as_dict()
     assert done.outcome == Outcome.COMPLETED
     assert summary["rotation_error_rad"]["max"] < BETWEEN_STEPS
     assert summary["infeasible_steps"] == 0
     low, high = summary["tension_limits_n"]
     assert low - 1e-9 <= summary["tension_n"]["min"] < summary["tension_n"]["max"] <= high
     assert summary["beyond_limits_n"] < 1e-9
-    distance, angle = mechanism_end_error(done)
+    distance, angle = done.end_error()
     assert distance == 0.0
     assert np.degrees(angle) < done.scenario.expected.rotation_deg
     np.testing.assert_allclose(done.log["positions"][-1], [0.3, -0.2], atol=BETWEEN_STEPS)
     # What cables carry at the end is what the tension distribution says at rest there.
-    follower, context = done.follower, done.follower.plant.CreateDefaultContext()
+    follower, context = done.built, done.built.plant.CreateDefaultContext()
     follower.plant.SetPositions(context, [0.3, -0.2])
     J = follower.cables.length_jacobian(context)
     carried = J.T @ done.log["tensions"][-1]
@@ -83,7 +78,7 @@ def test_an_arm_follows_by_computed_torque():
 
 
 def test_bases_drive_and_a_platform_follows_on_winches(bases):
-    summary = summarize_mechanism_run(bases)
+    summary = bases.as_dict()
     assert bases.outcome == Outcome.COMPLETED
     assert summary["position_error_m"]["max"] < GIVING
     assert summary["slack_cable_seconds"] == 0.0
@@ -93,7 +88,7 @@ def test_bases_drive_and_a_platform_follows_on_winches(bases):
     assert set(summary["parts"]) == {
         "platform::platform", *(f"base_{k}::{axis}" for k in (1, 2, 3, 4) for axis in "xy")
     }  # fmt: skip
-    expected, (distance, angle) = bases.scenario.expected, mechanism_end_error(bases)
+    expected, (distance, angle) = bases.scenario.expected, bases.end_error()
     assert distance < expected.position
     assert np.degrees(angle) < expected.rotation_deg
     # Winches are where they should be at every step: the lengths at the strains of the start.
@@ -115,10 +110,10 @@ def test_a_mechanism_that_shall_stay_stays():
     """At rest on winches with motors that hold: nothing drifts."""
     stays = ["motion.waypoints=[{time: 0.1}]", "duration=0.3"]
     done = ran(BASES, *stays)
-    assert summarize_mechanism_run(done)["position_error_m"]["max"] < 1e-10
+    assert done.as_dict()["position_error_m"]["max"] < 1e-10
     with_nobody = ran(ARM, *stays, "control.kind=winches", "control.prestress=40")
     assert "motor_forces" not in with_nobody.log
-    assert summarize_mechanism_run(with_nobody)["rotation_error_rad"]["max"] < 1e-10
+    assert with_nobody.as_dict()["rotation_error_rad"]["max"] < 1e-10
 
 
 def test_both_engines_come_to_the_same(bases):
@@ -151,18 +146,18 @@ def test_free_bodies_come_first_in_velocities_but_last_among_joints():
 
 def test_a_run_that_is_stopped_keeps_what_it_has():
     seen = []
-    done = run_mechanism_scenario(
-        load_scenario(BASES), RunSession(seen.append, lambda: len(seen) >= 3)
+    done = MechanismRun(load_scenario(BASES)).simulate(
+        RunSession(seen.append, lambda: len(seen) >= 3)
     )
     assert done.outcome == Outcome.INTERRUPTED
     assert done.sim_time == pytest.approx(0.3)
-    assert summarize_mechanism_run(done)["outcome"] == "interrupted"
+    assert done.as_dict()["outcome"] == "interrupted"
 
 
 @pytest.mark.parametrize("name", [ARM, BASES])
 def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, name):
     monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
-    kind, wanted = SCENARIO_KINDS["mechanism"], load_scenario(name, ["duration=0.5"])
+    kind, wanted = KINDS["mechanism"], load_scenario(name, ["duration=0.5"])
     assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path)
 
 
@@ -194,9 +189,9 @@ def test_a_step_that_is_too_long_is_told_and_the_run_diverges():
     coarse = load_scenario(BASES, ["integration.max_step=0.05", "control.rate=20", "duration=1"])
     (warning,) = [one for one in check_mechanism_run(coarse) if "max_step" in one]
     assert "accepted: at most 0.0036 s" in warning
-    done = run_mechanism_scenario(coarse)
+    done = MechanismRun(coarse).simulate()
     assert done.outcome == Outcome.DIVERGED
-    summary = summarize_mechanism_run(done)
+    summary = done.as_dict()
     json.dumps(summary, allow_nan=False)
     assert mechanism_facts(summary)
 
@@ -230,7 +225,7 @@ def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
     """Limits that the motion does not keep, while the places where it rests do."""
     way = "motion.waypoints=[{time: 0.15, joints: {elbow: -0.4}}]"
     done = ran(ARM, way, "duration=0.3", "control.limits=[2, 40]")
-    summary = summarize_mechanism_run(done)
+    summary = done.as_dict()
     assert summary["infeasible_steps"] > 0
     pictures = mechanism_pictures(done)
     assert "motor_forces.png" not in pictures

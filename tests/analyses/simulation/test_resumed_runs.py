@@ -2,8 +2,8 @@
 
 import pytest
 
+from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.analyses.simulation import log_keeper
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import scenario_kind
 from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
@@ -25,6 +25,6 @@ from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same
 )  # fmt: skip
 def test_a_killed_run_goes_on(tmp_path, monkeypatch, scenario, changes):
     monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
-    kind = SCENARIO_KINDS[scenario_kind(scenario)]
+    kind = KINDS[scenario_kind(scenario)]
     wanted = load_scenario(scenario, [*changes, "duration=0.3"])
     assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path, until=0.15)

@@ -5,10 +5,9 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import (
     pose_error,
@@ -40,11 +39,11 @@ def projected(*overrides):
 
 @pytest.fixture(scope="module")
 def default_run():
-    return run_scenario(load_scenario("acrobot_pbvs"))
+    return ServoRun(load_scenario("acrobot_pbvs")).simulate()
 
 
 def test_default_scenario_converges_with_the_rendered_camera(default_run):
-    summary = summarize(default_run)
+    summary = default_run.as_dict()
     assert summary["outcome"] == "converged"
     assert summary["camera"] == "rendered"
     assert summary["images"] is None
@@ -54,15 +53,17 @@ def test_default_scenario_converges_with_the_rendered_camera(default_run):
 
 
 def test_a_region_of_interest_says_how_many_images_were_whole():
-    result = run_scenario(load_scenario("acrobot_pbvs", ["camera.region=target", "duration=0.2"]))
-    summary = summarize(result)
+    result = ServoRun(
+        load_scenario("acrobot_pbvs", ["camera.region=target", "duration=0.2"])
+    ).simulate()
+    summary = result.as_dict()
     assert summary["images"] == {"taken": 5, "whole": 1}
-    images = dict(SCENARIO_KINDS["visual_servo"].facts(summary))["images"]
+    images = dict(KINDS["visual_servo"].facts(summary))["images"]
     assert images == "5, of which 1 whole"
 
 
 def test_rendered_run_repeats_byte_for_byte(default_run):
-    again = run_scenario(load_scenario("acrobot_pbvs", ["duration=0.5"]))
+    again = ServoRun(load_scenario("acrobot_pbvs", ["duration=0.5"])).simulate()
     n = len(again.log["time"])
     for name, values in again.log.items():
         assert values.tobytes() == default_run.log[name][:n].tobytes()
@@ -70,11 +71,11 @@ def test_rendered_run_repeats_byte_for_byte(default_run):
 
 @pytest.fixture(scope="module")
 def projected_run():
-    return run_scenario(projected("integration.engine=compiled"))
+    return ServoRun(projected("integration.engine=compiled")).simulate()
 
 
 def test_surplus_and_drift_are_those_of_the_log(projected_run):
-    summary, log = summarize(projected_run), projected_run.log
+    summary, log = projected_run.as_dict(), projected_run.log
     row = int(np.argmax(np.max(log["surplus_lengths"], axis=1)))
     cables = projected_run.servo.cable_robot.forces.cable_set()
     straight = cable_paths(pose_from_row(log["X_WP"][row]), cables).lengths
@@ -89,9 +90,9 @@ def test_surplus_and_drift_are_those_of_the_log(projected_run):
 
 def test_without_noise_the_path_in_the_image_is_straight():
     """The ideal property of this feature, servoing thesis 1.4.4."""
-    exact = run_scenario(projected("camera.pixel_noise=0.0", "integration.engine=compiled"))
+    exact = ServoRun(projected("camera.pixel_noise=0.0", "integration.engine=compiled")).simulate()
     assert exact.outcome == Outcome.CONVERGED
-    assert summarize(exact)["image_deviation_px"]["max"] < 0.5
+    assert exact.as_dict()["image_deviation_px"]["max"] < 0.5
 
 
 def test_rendered_and_projected_runs_follow_the_same_path(default_run, projected_run):
@@ -103,7 +104,7 @@ def test_rendered_and_projected_runs_follow_the_same_path(default_run, projected
 
 
 def test_projected_run_repeats_byte_for_byte_and_depends_on_the_seed():
-    first, again, other = (run_scenario(projected("duration=0.5", s)) for s in
+    first, again, other = (ServoRun(projected("duration=0.5", s)).simulate() for s in
                            ("seed=5", "seed=5", "seed=6"))  # fmt: skip
     for name, values in first.log.items():
         assert values.tobytes() == again.log[name].tobytes()
@@ -111,17 +112,19 @@ def test_projected_run_repeats_byte_for_byte_and_depends_on_the_seed():
 
 
 def test_timeout():
-    result = run_scenario(projected("duration=0.33"))
+    result = ServoRun(projected("duration=0.33")).simulate()
     assert result.outcome == Outcome.TIMEOUT
     assert result.sim_time == pytest.approx(0.33)
 
 
 def test_target_lost_stops_the_cables():
     # The tag behind the wall of the room is never seen.
-    result = run_scenario(projected("target.pose.position=[9.0, 9.0, 0.0]", "stop.target_lost=0.2"))
+    result = ServoRun(
+        projected("target.pose.position=[9.0, 9.0, 0.0]", "stop.target_lost=0.2")
+    ).simulate()
     assert result.outcome == Outcome.TARGET_LOST
     assert np.all(result.log["cable_velocities"] == 0.0)
-    summary = summarize(result)
+    summary = result.as_dict()
     assert summary["image_deviation_px"] == {"max": None, "mean": None}
 
 
@@ -133,7 +136,7 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
     low = tmp_path / "low.yaml"
     low.write_text(yaml.safe_dump(robot))
     # Above the tag, with a camera that is assumed upside down, the servo drives up, not down.
-    result = run_scenario(
+    result = ServoRun(
         projected(
             "perturbations.camera_pose={position: [0, 0, 0], angles_deg: [180, 0, 0]}",
             "initial_pose={position: [0, 0, 0.3]}",
@@ -142,7 +145,7 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
             f"robot={low}",
             "integration.engine=compiled",
         )
-    )
+    ).simulate()
     assert result.outcome == Outcome.DIVERGED
     heights = result.log["X_WP"][:, 6]
     assert heights[-1] == np.max(heights) == pytest.approx(ceiling, abs=0.02)
@@ -150,7 +153,9 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
 
 def test_stop_request_keeps_what_was_simulated():
     seen = []
-    result = run_scenario(projected(), on_progress=seen.append, should_stop=lambda: len(seen) >= 5)
+    result = ServoRun(projected()).simulate(
+        on_progress=seen.append, should_stop=lambda: len(seen) >= 5
+    )
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.5)
     assert len(result.log["time"]) == 26
@@ -158,7 +163,7 @@ def test_stop_request_keeps_what_was_simulated():
 
 def test_a_field_that_a_session_has_not_is_refused():
     with pytest.raises(TypeError, match="resumed"):
-        run_scenario(projected(), resumed=True)
+        ServoRun(projected()).simulate(resumed=True)
 
 
 def test_keyboard_interrupt_keeps_what_was_simulated():
@@ -166,7 +171,7 @@ def test_keyboard_interrupt_keeps_what_was_simulated():
         if progress.sim_time > 0.25:
             raise KeyboardInterrupt
 
-    result = run_scenario(projected(), RunSession(interrupt))
+    result = ServoRun(projected()).simulate(RunSession(interrupt))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.3)
 
@@ -183,7 +188,7 @@ def test_pose_rows_distance_is_pose_error():
 
 def test_a_step_that_is_far_too_long_ends_as_diverged_with_what_was_logged():
     """In the warm-up, too, which once ended in a traceback."""
-    result = run_scenario(projected("integration.max_step=0.2", "duration=5"))
+    result = ServoRun(projected("integration.max_step=0.2", "duration=5")).simulate()
     assert result.outcome == Outcome.DIVERGED
     assert len(result.log["time"]) >= 1
-    assert summarize(result)["outcome"] == "diverged"
+    assert result.as_dict()["outcome"] == "diverged"

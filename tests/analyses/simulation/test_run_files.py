@@ -10,8 +10,8 @@ import pytest
 
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 from cdpr_drake.analyses.reporting.log_files import column_names
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.systems.diagrams.load import load_scenario
 
@@ -29,7 +29,7 @@ FIGURES = ("image_path", "error", "cable_velocities", "cable_lengths", "tensions
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
-    result = run_scenario(load_scenario("acrobot_pbvs", [*SHORT, "duration=0.4"]))
+    result = ServoRun(load_scenario("acrobot_pbvs", [*SHORT, "duration=0.4"])).simulate()
     write_run_data(folder, result)
     assert write_pictures(folder, run_pictures(result, True)) == {}
     return folder, result
@@ -53,7 +53,7 @@ def test_npz_and_csv_hold_the_same_log(run):
     with (folder / "log.csv").open(newline="") as file:
         rows = list(csv.reader(file))
     assert rows[0] == column_names(
-        result.log, [f"C{i}" for i in range(1, 9)], result.servo.feature_names
+        result.log, [f"C{i}" for i in range(1, 9)], result.built.feature_names
     )
     assert len(set(rows[0])) == len(rows[0])
     np.testing.assert_array_equal(np.array(rows[1:], float), table)
@@ -61,7 +61,7 @@ def test_npz_and_csv_hold_the_same_log(run):
 
 def test_the_written_scenario_runs_again_to_the_same_bytes(run, tmp_path):
     folder, result = run
-    write_run_data(tmp_path, run_scenario(load_scenario(str(folder / "scenario.yaml"))))
+    write_run_data(tmp_path, ServoRun(load_scenario(str(folder / "scenario.yaml"))).simulate())
     for name in ("log.npz", "log.csv"):
         assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
     write_run_data(tmp_path, result)
@@ -93,7 +93,7 @@ def test_replay_holds_the_motion(run, tmp_path):
     """A page without a recording would be as long for one row as for all."""
     result = run[1]
     first = {name: values[:1] for name, values in result.log.items()}
-    write_replay(tmp_path / "still.html", result.servo.robot, first, result.servo.scenario)
+    write_replay(tmp_path / "still.html", result.built.robot, first, result.built.scenario)
     still = (tmp_path / "still.html").stat().st_size
     frames = 10  # of 0.4 s at 25 Hz, beyond the first
     bytes_per_pose = 7 * 8
@@ -120,7 +120,7 @@ def test_film_has_a_frame_per_image(run):
     ],
 )
 def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expected, tmp_path):
-    result = run_scenario(load_scenario(name, [*SHORT, "duration=0.1"]))
+    result = ServoRun(load_scenario(name, [*SHORT, "duration=0.1"])).simulate()
     write_run_data(tmp_path, result)
     pictures = run_pictures(result, True)
     figures = {f"{figure}.png": pictures[f"{figure}.png"] for figure in FIGURES}

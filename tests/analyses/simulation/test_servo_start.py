@@ -4,17 +4,18 @@ import re
 
 import pytest
 
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.start_checks import (
+from cdpr_drake.analyses.runs.checks import (
     check_length,
     check_start,
     goal_warnings,
     sheave_warnings,
     step_warnings,
 )
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_built, run_scenario, warm_up
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.simulate import KINDS
+from cdpr_drake.analyses.runs.tension import TensionRun
+from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.simulation.visual_servo_run import run_built, warm_up
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.materials import BehaviourSettings
@@ -127,12 +128,12 @@ def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
     assert result.sim_time == pytest.approx(0.2)
 
 
-@pytest.mark.parametrize("name", SCENARIO_KINDS)
+@pytest.mark.parametrize("name", KINDS)
 def test_every_kind_refuses_runs_that_would_never_end(name):
     """Runs by tensions once began whatever their step was."""
     scenario = load_scenario(scenario_names(name)[0], ["integration.max_step=1e-12"])
     with pytest.raises(ScenarioError, match="accepted: at most"):
-        SCENARIO_KINDS[name].check(scenario)
+        KINDS[name].check(scenario)
 
 
 @pytest.mark.parametrize(
@@ -152,6 +153,6 @@ def test_rates_that_nothing_follows_are_refused(name, key):
 def test_slow_cameras_and_controllers_do_not_make_warming_up_longer_than_the_run():
     """One image in a hundred years: such a run once began with them."""
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, "camera.rate=3e-10", "duration=0.05"])
-    assert run_scenario(scenario).sim_time == pytest.approx(0.05)
+    assert ServoRun(scenario).simulate().sim_time == pytest.approx(0.05)
     scenario = load_scenario("planar_computed_torque", ["controller.rate=3e-10", "duration=0.05"])
-    assert run_tension_scenario(scenario).sim_time <= 0.05
+    assert TensionRun(scenario).simulate().sim_time <= 0.05

@@ -7,13 +7,13 @@ import cv2
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH, UNTOUCHED, ByHand
 from cdpr_drake.analyses.simulation.live_control import Steering, check_steered
 from cdpr_drake.analyses.simulation.live_messages import Message, open_connection, receive, send
 from cdpr_drake.analyses.simulation.mark_images import MarksPicture
 from cdpr_drake.analyses.simulation.realtime_rate import RealtimeRate
 from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -123,7 +123,7 @@ def steered(loaded, *acts):
 
             simulator.set_monitor(monitor)
 
-        result = run_scenario(loaded, RunSession(prepare=prepare))
+        result = ServoRun(loaded).simulate(RunSession(prepare=prepare))
         said = []
         while ours.poll(0.0):
             message = receive(ours)
@@ -152,13 +152,13 @@ def test_a_run_with_hands_on_it_is_that_of_the_scenario_that_is_kept(engine):
     assert np.all(tensions[time > event.time, 2] == 0.0)
     assert np.all(tensions[time < push.start, 2] > 0.0)
     assert push.start < 0.12
-    again = run_scenario(loaded)
+    again = ServoRun(loaded).simulate()
     for name in ("time", "X_WP", "tensions"):
         np.testing.assert_array_equal(again.log[name], result.log[name])
 
 
 def test_a_run_that_nobody_touches_is_as_without():
-    plain = run_scenario(scenario("integration.loop=diagram"))
+    plain = ServoRun(scenario("integration.loop=diagram")).simulate()
     open_, said = steered(scenario(*OPEN))
     assert said == []
     np.testing.assert_array_equal(open_.log["time"], plain.log["time"])

@@ -7,14 +7,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.run_summary import (
-    camera_path,
-    drift,
-    final_errors,
-    image_path,
-    summarize,
-)
-from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
+from cdpr_drake.analyses.runs.servo import drift
+from cdpr_drake.analyses.simulation.run_traces import estimate_jump
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from tests.analyses.simulation.run_by_hand import (
@@ -51,12 +45,12 @@ def hand():
 
 @pytest.fixture(scope="module")
 def summary(hand):
-    return summarize(hand)
+    return hand.as_dict()
 
 
 @pytest.fixture(scope="module")
 def traces(hand):
-    return run_traces(hand)
+    return hand.traces()
 
 
 def in_the_image():
@@ -75,7 +69,7 @@ def in_space(servo):
 
 def test_the_image_path_is_where_the_target_was_seen(hand):
     """In pixels, without the rows that did not see it; the line starts at the first sample."""
-    times, path, line = image_path(hand)
+    times, path, line = hand.image_path
     np.testing.assert_array_equal(times, [0.0, 1.5, 3.5])
     np.testing.assert_allclose(path, SEEN[FOUND], atol=BY_HAND)
     np.testing.assert_allclose(line, [[100.0, 50.0], MIDDLE], atol=BY_HAND)
@@ -85,16 +79,16 @@ def test_the_desired_point_need_not_be_the_middle_of_the_image():
     shifted = run_by_hand("acrobot_pbvs", "desired.position=[0.01, -0.02, 0.09]")
     pinhole = shifted.servo.pinhole
     expected = [319.5 + pinhole.fx * 0.01 / 0.09, 239.5 - pinhole.fy * 0.02 / 0.09]
-    np.testing.assert_allclose(image_path(shifted)[2][1], expected, atol=BY_HAND)
+    np.testing.assert_allclose(shifted.image_path[2][1], expected, atol=BY_HAND)
 
 
 def test_a_run_that_never_saw_its_target_has_no_image_path(hand):
     blind = replace(hand, log=hand.log | {"found": np.zeros((4, 1))})
-    times, path, line = image_path(blind)
+    times, path, line = blind.image_path
     assert len(times) == 0
     assert path.shape == (0, 2)
     np.testing.assert_allclose(line, [MIDDLE] * 2, atol=BY_HAND)
-    assert summarize(blind)["image_deviation_px"] == {"max": None, "mean": None}
+    assert blind.as_dict()["image_deviation_px"] == {"max": None, "mean": None}
 
 
 def test_the_image_and_deviations_in_it_also_as_if_it_had_1600_pixels(summary, traces):
@@ -113,7 +107,10 @@ def test_the_image_and_deviations_in_it_also_as_if_it_had_1600_pixels(summary, t
 
 def test_the_camera_path_runs_from_its_first_sample_to_the_desired_pose(hand, summary, traces):
     servo, (places, goal, away) = hand.servo, in_space(hand.servo)
-    for track, line in (camera_path(hand), (traces["camera_path"], traces["camera_line"])):
+    for track, line in (
+        (hand.camera_path, hand.camera_line),
+        (traces["camera_path"], traces["camera_line"]),
+    ):
         np.testing.assert_allclose(track, places, atol=BY_HAND)
         np.testing.assert_allclose(line, [places[0], goal], atol=BY_HAND)
     expected = {"max": np.max(away), "mean": np.mean(away)}
@@ -128,7 +125,7 @@ def test_a_camera_in_the_world_is_seen_from_its_target():
     """The target moves with the platform, so the path of the camera is in the target's frame."""
     hand = run_by_hand("acrobot_eye_to_hand")
     servo = hand.servo
-    track, line = camera_path(hand)
+    track, line = (hand.camera_path, hand.camera_line)
     X_WC = servo.mounting.X_WC(platform_poses()[0])
     X_PO = servo.scenario.target.pose.transform()
     seen = [(X_WP @ X_PO).inverse() @ X_WC for X_WP in platform_poses()]
@@ -148,7 +145,7 @@ def test_errors_of_estimate_and_plan(hand, summary):
         assert summary[key] == pytest.approx(value, abs=BY_HAND), key
     assert summary["plan_deviation_m"] == {"max": None, "mean": None}
     assert summary["plan_deviation_rad"] == {"max": None, "mean": None}
-    planned = summarize(with_plan(hand))
+    planned = with_plan(hand).as_dict()
     assert planned["plan_deviation_m"] == pytest.approx(
         {"max": max(PLAN_OFF), "mean": 0.02}, abs=BY_HAND
     )
@@ -174,7 +171,7 @@ def test_final_errors_are_from_where_a_moving_target_is_at_the_end():
     p_WO = np.array([-0.06, -0.18 + 0.02 * TIMES[-1], 0.0])
     p_CO = (platform_poses()[-1] @ servo.X_PC).inverse() @ p_WO
     distance = np.linalg.norm(p_CO - servo.X_CdO.translation())
-    assert final_errors(moving)[0] == pytest.approx(distance, abs=BY_HAND)
+    assert moving.end_error()[0] == pytest.approx(distance, abs=BY_HAND)
 
 
 def test_slack_seconds_last_from_a_row_to_the_next(summary):
@@ -205,22 +202,22 @@ def test_words_and_numbers_of_the_run(hand, summary):
 
 
 def test_a_run_that_took_no_time_has_no_real_time_factor(hand):
-    assert summarize(replace(hand, wall_time=0.0))["realtime_factor"] is None
-    assert summarize(replace(hand, wall_time=1.0))["realtime_factor"] == 3.5
+    assert replace(hand, wall_time=0.0).as_dict()["realtime_factor"] is None
+    assert replace(hand, wall_time=1.0).as_dict()["realtime_factor"] == 3.5
 
 
 def test_broken_cables_are_named_with_their_times(hand):
     times = np.array([-1.0, 0.0, -1.0, 2.25, -1.0, -1.0, -1.0, -1.0])
-    found = summarize(replace(hand, broken=times))["broken_cables"]
+    found = replace(hand, broken=times).as_dict()["broken_cables"]
     assert found == [{"cable": "C2", "time_s": 0.0}, {"cable": "C4", "time_s": 2.25}]
-    assert summarize(replace(hand, broken=np.full(8, -1.0)))["broken_cables"] == []
+    assert replace(hand, broken=np.full(8, -1.0)).as_dict()["broken_cables"] == []
 
 
 def test_a_moving_target_has_no_line_and_a_plan_has_a_name():
-    moving = summarize(run_by_hand("acrobot_moving_tag"))
+    moving = run_by_hand("acrobot_moving_tag").as_dict()
     for key in ("image_deviation_px", "image_deviation_px_1600x1200", "camera_deviation_m"):
         assert moving[key] == {"max": None, "mean": None}
-    assert summarize(run_by_hand("acrobot_open_loop"))["controller"] == "open_loop"
+    assert run_by_hand("acrobot_open_loop").as_dict()["controller"] == "open_loop"
 
 
 def test_a_diverged_run_has_no_numbers_and_no_warnings(hand):
@@ -231,7 +228,7 @@ def test_a_diverged_run_has_no_numbers_and_no_warnings(hand):
     lost = replace(
         hand, outcome=Outcome.DIVERGED, log=hand.log | {"X_WP": rows, "tensions": tensions}
     )
-    found = summarize(lost)
+    found = lost.as_dict()
     assert found["outcome"] == "diverged"
     assert found["tension_n"] == {"min": None, "max": None}
     assert found["final_position_error_m"] is None
@@ -272,7 +269,7 @@ def test_the_jump_is_of_the_error_and_not_of_the_path(hand, traces):
     two = {key: traces[key][2:] for key in ("platform_path", "estimate_path")}
     assert estimate_jump(two) == pytest.approx(0.001, abs=BY_HAND)
     rows = np.array([pose_row(X) for X in platform_poses()])
-    exact = run_traces(replace(hand, log=hand.log | {"X_WP_estimated": rows}))
+    exact = replace(hand, log=hand.log | {"X_WP_estimated": rows}).traces()
     assert estimate_jump(exact) == 0.0
 
 

@@ -9,13 +9,11 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.analyses.simulation.tension_control_run import (
-    TensionRun,
     make_control,
     make_simulator,
-    run_tension_scenario,
-    summarize_tension_run,
     tension_pictures,
     write_tension_data,
 )
@@ -37,8 +35,8 @@ def test_every_scenario_tracks_its_trajectory(name):
     """Those that the plant alone can run, up to where the last push or contact ends."""
     alone = load_scenario(name).plant_alone
     short = ["duration=4.0"] if alone else ["integration.engine=compiled"]
-    run = run_tension_scenario(load_scenario(name, short))
-    summary = summarize_tension_run(run)
+    run = TensionRun(load_scenario(name, short)).simulate()
+    summary = run.as_dict()
     assert run.outcome == Outcome.COMPLETED
     if not run.scenario.plant_alone:  # what forces move is off its trajectory
         assert summary["position_error_m"]["max"] < TRACKING
@@ -52,7 +50,7 @@ def test_same_scenario_same_bytes(tmp_path):
     scenario = load_scenario("caroca_computed_torque", ["duration=0.3"])
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
-        run = run_tension_scenario(scenario)
+        run = TensionRun(scenario).simulate()
         write_tension_data(tmp_path / folder, run)
     assert write_pictures(tmp_path / "a", tension_pictures(run)) == {}
     for name in ("log.npz", "log.csv", "scenario.yaml"):
@@ -68,7 +66,7 @@ def test_infeasible_requests_are_counted_and_the_run_goes_on():
         "trajectory.stretches=[{pose: {position: [0, 0, 0.25]}, duration: 0.4}]",
         "distribution.limits=[1.0, 6.5]", "duration=1.5", "integration.engine=compiled",
     ])  # fmt: skip
-    summary = summarize_tension_run(run_tension_scenario(scenario))
+    summary = TensionRun(scenario).simulate().as_dict()
     assert summary["infeasible_steps"] > 0
     assert summary["outcome"] in ("completed", "diverged")
 
@@ -76,7 +74,7 @@ def test_infeasible_requests_are_counted_and_the_run_goes_on():
 def test_stop_request():
     seen = []
     scenario = load_scenario("planar_computed_torque")
-    run = run_tension_scenario(scenario, RunSession(seen.append, lambda: len(seen) >= 3))
+    run = TensionRun(scenario).simulate(RunSession(seen.append, lambda: len(seen) >= 3))
     assert run.outcome == Outcome.INTERRUPTED
     assert run.sim_time == pytest.approx(0.3)
     assert np.all(np.isfinite(run.log["X_WP"]))
@@ -108,10 +106,10 @@ def test_a_control_step_that_is_far_too_long_diverges_with_what_was_logged():
         "planar_computed_torque",
         ["controller.rate=1", "controller.stiffness=1e6", "distribution.limits=[0, 1e12]"],
     )
-    run = run_tension_scenario(scenario)
+    run = TensionRun(scenario).simulate()
     assert run.outcome == Outcome.DIVERGED
     assert len(run.log["time"]) >= 1
-    json.dumps(summarize_tension_run(run), allow_nan=False)
+    json.dumps(run.as_dict(), allow_nan=False)
 
 
 # The summary of a run by tensions, against a log that is written by hand.
@@ -148,7 +146,7 @@ def run():
 
 
 def test_every_number_is_that_of_the_log(run):
-    summary = summarize_tension_run(run)
+    summary = run.as_dict()
     position, rotation = summary.pop("position_error_m"), summary.pop("rotation_error_rad")
     assert position == pytest.approx({"max": 0.02, "mean": 0.01, "final": 0.01}, abs=BY_HAND)
     mean = (0.1 + 0.3) / 3.0
@@ -183,19 +181,19 @@ def test_every_number_is_that_of_the_log(run):
 
 
 def test_what_a_run_cannot_have_is_none(run):
-    assert summarize_tension_run(replace(run, wall_time=0.0))["realtime_factor"] is None
-    assert summarize_tension_run(replace(run, wall_time=1.0))["realtime_factor"] == 1.0
+    assert replace(run, wall_time=0.0).as_dict()["realtime_factor"] is None
+    assert replace(run, wall_time=1.0).as_dict()["realtime_factor"] == 1.0
     first = {key: values[:1] for key, values in run.log.items()}
-    found = summarize_tension_run(replace(run, log=first, outcome=Outcome.DIVERGED))
+    found = replace(run, log=first, outcome=Outcome.DIVERGED).as_dict()
     assert found["tension_n"] == {"min": None, "max": None}
     assert found["outcome"] == "diverged"
 
 
 def test_the_integrator_is_that_of_the_scenario(run):
-    simulator = make_simulator(run.control, run.scenario)
+    simulator = make_simulator(run.built, run.scenario)
     assert simulator.get_integrator().get_fixed_step_mode()
     assert simulator.get_integrator().get_maximum_step_size() == 0.002
-    X_WP = run.control.in_plant.pose(
-        run.control.in_plant.plant.GetMyContextFromRoot(simulator.get_context())
+    X_WP = run.built.in_plant.pose(
+        run.built.in_plant.plant.GetMyContextFromRoot(simulator.get_context())
     )
     np.testing.assert_allclose(X_WP.translation(), [0.0, 0.0, 0.2], atol=BY_HAND)

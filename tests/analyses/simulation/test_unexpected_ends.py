@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.start_checks import limit_warnings, servo_limit_warnings
-from cdpr_drake.analyses.simulation.unexpected_end import slack_words, unexpected_end
+from cdpr_drake.analyses.runs.checks import limit_warnings, servo_limit_warnings
+from cdpr_drake.analyses.runs.unexpected_end import slack_words, unexpected_end
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
+from cdpr_drake.analyses.runs.seeds import run_many, with_seeds
 from cdpr_drake.errors import DivergedError
 from cdpr_drake.geometry.drake_pose_kernel import agrees
 from cdpr_drake.models.robot_loader import robot_text

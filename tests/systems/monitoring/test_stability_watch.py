@@ -9,16 +9,16 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.reporting.log_files import write_log
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.run_stability import (
-    StabilityAlong,
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.stability import (
+    Stability,
     run_criterion,
     stability_along,
+    stability_figure,
     turned_criterion,
 )
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.stability_files import assess_run, stability_figure
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.simulation.run_figures import run_figures
+from cdpr_drake.analyses.simulation.stability_files import assess_run
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -35,14 +35,14 @@ SIGNALS = ("taut_cables", "jacobian_rank", "stability_margin")
 
 @pytest.fixture(scope="module")
 def result():
-    return run_scenario(load_scenario(SLACK, [*SHORT, "stability={threshold: 1}"]))
+    return ServoRun(load_scenario(SLACK, [*SHORT, "stability={threshold: 1}"])).simulate()
 
 
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     path = tmp_path_factory.mktemp("run")
-    write_log(path, result.log, [f"C{k}" for k in range(1, 9)], result.servo.feature_names)
-    write_run_inputs(path, result.servo.scenario, result.servo.robot)
+    write_log(path, result.log, [f"C{k}" for k in range(1, 9)], result.built.feature_names)
+    write_run_inputs(path, result.built.scenario, result.built.robot)
     return path
 
 
@@ -63,7 +63,7 @@ def test_live_signals_are_what_log_and_folder_tell_afterwards(result, folder):
 
 
 def test_a_summary_takes_them_from_the_log(result):
-    summary, log = summarize(result), result.log
+    summary, log = result.as_dict(), result.log
     assert summary["least_jacobian_rank"] == np.min(log["jacobian_rank"])
     assert summary["least_stability_margin"] == np.min(log["stability_margin"])
     lost = np.diff(log["time"]) * (log["stability_margin"][:-1, 0] <= 0.0)
@@ -71,9 +71,9 @@ def test_a_summary_takes_them_from_the_log(result):
 
 
 def test_a_log_without_the_section_has_none_of_it():
-    short = run_scenario(load_scenario(SLACK, [*SHORT, "duration=0.1"]))
+    short = ServoRun(load_scenario(SLACK, [*SHORT, "duration=0.1"])).simulate()
     assert "stability_margin" not in short.log
-    assert summarize(short)["least_jacobian_rank"] is None
+    assert short.as_dict()["least_jacobian_rank"] is None
     assert "stability.png" not in run_figures(short)
 
 
@@ -109,7 +109,7 @@ def test_the_figure_is_red_where_rank_is_lost():
     time = np.linspace(0.0, 4.0, 41)
     rank = np.where((time > 1.0) & (time < 2.0), 4.0, 6.0)
     margin = np.where(rank < 6.0, 0.0, 0.9)
-    figure = stability_figure("title", StabilityAlong(time, rank + 1.0, rank, margin, 6))
+    figure = stability_figure("title", Stability(time, rank + 1.0, rank, margin, 6))
     cables, ranks, margins = figure.axes
     for panel in figure.axes:
         (span,) = (patch for patch in panel.patches if patch.get_hatch())

@@ -9,9 +9,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.simulation.pick_and_place_figures import live_view, shown_things
+from cdpr_drake.analyses.runs.pick_and_place import shown_things
+from cdpr_drake.analyses.runs.simulate import KINDS
+from cdpr_drake.analyses.simulation.pick_and_place_figures import live_view
 from cdpr_drake.analyses.simulation.pick_and_place_summary import phase_spans
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -20,7 +21,7 @@ from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
 from tests.messages import printed
 
 NAME = "acrobot_pick_and_place"
-KIND = SCENARIO_KINDS["pick_and_place"]
+KIND = KINDS["pick_and_place"]
 
 SHORT = (
     "camera.kind=projected", "initial_pose={position: [-0.12, -0.05, 0.23]}",

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.remote_client import RemoteClient
@@ -46,7 +46,7 @@ class Server:
             self.drivers.append(driver)
 
         tension = isinstance(scenario, TensionScenario)
-        run = (run_tension_scenario if tension else run_scenario)(
+        run = (TensionRun if tension else ServoRun)(
             scenario, RunSession(connect=connect, **options)
         )
         self.drivers[-1].end(

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -42,7 +42,7 @@ def projected(name):
 def shortened(name, items):
     """A scenario with a projected target and changes that make it short, or cut after a time."""
     scenario = load_scenario(name, [*projected(name), *items])
-    if SCENARIO_KINDS[scenario.kind].is_servo:
+    if KINDS[scenario.kind].is_servo:
         scenario = choose_compiled_loop(scenario)
     else:
         scenario = set_loop(scenario, repeated=True)[0]
@@ -56,7 +56,7 @@ def shortened(name, items):
 def test_a_scenario_ends_as_its_file_says_and_does_what_its_title_names(name, tmp_path):
     checks, items = TITLES[name]
     shipped = load_scenario(name)
-    kind, expected = SCENARIO_KINDS[shipped.kind], shipped.expected
+    kind, expected = KINDS[shipped.kind], shipped.expected
     assert expected is not None
     if WHOLE:
         scenario = set_loop(shipped)[0]

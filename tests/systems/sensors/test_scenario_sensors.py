@@ -9,8 +9,9 @@ from pydrake.geometry import Box, Role
 from pydrake.systems.analysis import InitializeParams
 
 from cdpr_drake.analyses.reporting.log_files import column_names
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator, run_scenario
+from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance, rotation_vector
@@ -33,7 +34,7 @@ TRACTEL = ("sensors.tension=tractel", "sensors.log=[tension]")
 
 
 def run_of(name, *changes):
-    return run_scenario(load_scenario(name, changes))
+    return ServoRun(load_scenario(name, changes)).simulate()
 
 
 def servo_of(name, *changes):
