@@ -8,7 +8,6 @@ from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
-from .analyses.front.failures import compare_reactions as compare_reactions
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
@@ -26,7 +25,9 @@ from .analyses.logs.log_request import LogRequest as LogRequest
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
-from .analyses.simulation.stability_files import assess_run as assess_run
+from .analyses.runs.along import assess_run as assess_run
+from .analyses.runs.reactions import compare_reactions as compare_reactions
+from .analyses.runs.seeds import repeat_run as repeat_run
 from .analyses.statics.static import solve_static as solve_static
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case

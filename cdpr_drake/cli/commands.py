@@ -46,11 +46,8 @@ COMMANDS = {
         "Simulates a scenario and writes summary, log, figures and replay.",
         ("cdpr simulate", "cdpr simulate caroca_ibvs --camera projected --seeds 0:20"),
         {"seeds": (
-            f"{_CLI}.simulate:simulate",
-            "Simulates a scenario and writes summary, log, figures and replay.",
-        ), "compare-reactions": (
-            f"{_CLI}.simulate:simulate",
-            "Simulates a scenario and writes summary, log, figures and replay.",
+            f"{_VERBS}.runs.seeds:repeat_run",
+            "Repeats a visual servo over seeds, and writes statistics, a table and a figure.",
         )},
     ),
     "finish": Command(
@@ -59,9 +56,14 @@ COMMANDS = {
         ("cdpr finish runs/acrobot_pbvs", "cdpr finish runs/acrobot_pbvs --video"),
     ),
     "serve": Command(
-        _RUN, f"{_CLI}.serve:serve",
+        _RUN, f"{_VERBS}.runs.serve:serve",
         "Runs a scenario with an external process in its loop, over ZeroMQ.",
         ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
+    ),
+    "reactions": Command(
+        _RUN, f"{_VERBS}.runs.reactions:compare_reactions",
+        "Breaks a cable of a visual servo by motor torques, once for each reaction.",
+        ("cdpr reactions", "cdpr reactions acrobot_broken_redistributed --cable 5 --after 1"),
     ),
     "environments": Command(
         _RUN, f"{_VERBS}.environments:list_environments",
@@ -142,7 +144,7 @@ COMMANDS = {
         "Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).",
         ("cdpr stability acrobot_large", "cdpr stability acrobot_large --scheme pbvs --json"),
         {"along": (
-            f"{_VERBS}.simulation.stability_files:assess_run",
+            f"{_VERBS}.runs.along:assess_run",
             "Judges the stability of a visual servo along a run, with slack cables left out.",
         )},
     ),
