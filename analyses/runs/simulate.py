@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -128,7 +127,8 @@ def simulate(
     with results_folder(base, run.arguments(), folder, overwrite, follow.results) as results:
         if results is None:
             return run.simulate(None, follow)
-        _write_inputs(run, results)
+        with results.files() as stage:
+            run.write_inputs(stage)
         with results.writing():
             results.claim(PARTS)
             run.simulate(results.path, follow)
@@ -218,14 +218,6 @@ def _check_options(
         raise ScenarioError("host, port: found alone; accepted: with meshcat")
     if meshcat and steered_by is not None:
         raise ScenarioError("meshcat, steered_by: found together; accepted: one of them")
-
-
-def _write_inputs(run: Run, results: Folder) -> None:
-    with results.writing(), TemporaryDirectory() as stage:
-        run.write_inputs(Path(stage))
-        for path in sorted(Path(stage).iterdir()):
-            with results.file(path.name) as part:
-                part.write_bytes(path.read_bytes())
 
 
 def _exports(

@@ -63,7 +63,7 @@ COMMANDS = {
     "reactions": Command(
         _RUN, f"{_VERBS}.runs.reactions:compare_reactions",
         "Breaks a cable of a visual servo by motor torques, once for each reaction.",
-        ("cdpr reactions", "cdpr reactions acrobot_broken_redistributed --cable 5 --after 1"),
+        ("cdpr reactions", "cdpr reactions --cable 3 --reactions stop,brake --camera projected"),
     ),
     "environments": Command(
         _RUN, f"{_VERBS}.environments:list_environments",
