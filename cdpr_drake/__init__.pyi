@@ -22,6 +22,7 @@ from .analyses.logs.log_request import LogRequest as LogRequest
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
+from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
 from .analyses.runs.seeds import repeat_run as repeat_run
@@ -31,7 +32,6 @@ from .analyses.runs.servo import ServoRun as ServoRun
 from .analyses.runs.simulate import finish_run as finish_run
 from .analyses.runs.simulate import simulate as simulate
 from .analyses.runs.tension import TensionRun as TensionRun
-from .analyses.simulation.stability_files import assess_run as assess_run
 from .analyses.statics.static import solve_static as solve_static
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case

@@ -135,7 +135,7 @@ class Record:
         """Writes it into a results folder; raises OutputFolderError if that is not possible."""
         words = np.frombuffer(json.dumps(self.summary).encode(), np.uint8)
         traces = {f"trace.{name}": values for name, values in self.traces.items()}
-        arrays = {"summary": words, "end": self.end, **traces}
+        arrays: dict[str, Any] = {"summary": words, "end": self.end, **traces}
         folder.write_arrays(f"{SEEDS}/{self.seed}.npz", arrays)
 
     @classmethod

@@ -144,7 +144,7 @@ COMMANDS = {
         "Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).",
         ("cdpr stability acrobot_large", "cdpr stability acrobot_large --scheme pbvs --json"),
         {"along": (
-            f"{_VERBS}.simulation.stability_files:assess_run",
+            f"{_VERBS}.runs.along:assess_run",
             "Judges the stability of a visual servo along a run, with slack cables left out.",
         )},
     ),
