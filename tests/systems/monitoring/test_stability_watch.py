@@ -16,7 +16,7 @@ from cdpr_drake.analyses.runs.stability import (
     stability_figure,
     turned_criterion,
 )
-from cdpr_drake.analyses.runs.assessment import assess_run
+from cdpr_drake.analyses.runs.along import assess_run
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
