@@ -80,6 +80,13 @@ def resting(remote: Remote | None) -> AbstractContextManager[None]:
     return nullcontext() if remote is None else remote.resting()
 
 
+def fixed_step_simulator(diagram: Any, context: Any, method: str, step: float) -> Simulator:
+    """A simulator by one of Drake's integrators, such as runge_kutta3, at steps of a length [s]."""
+    simulator = Simulator(diagram, context)
+    ResetIntegratorFromFlags(simulator, method, step).set_fixed_step_mode(True)
+    return simulator
+
+
 class DiagramEngine(Engine):
     """A diagram in Drake's simulator, at fixed steps.
 
@@ -111,9 +118,7 @@ class DiagramEngine(Engine):
         self.context = built.make_context()
 
     def _simulator(self, context: Any) -> Simulator:
-        simulator = Simulator(self._built.diagram, context)
-        ResetIntegratorFromFlags(simulator, self._method, self._step).set_fixed_step_mode(True)
-        return simulator
+        return fixed_step_simulator(self._built.diagram, context, self._method, self._step)
 
     def start(self, resumed: bool, follow: Follow, run: Run) -> None:
         self._drake = self._simulator(self.context)

@@ -41,6 +41,7 @@ from cdpr_drake.systems.diagrams.mechanism_control import (
     part_name,
 )
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import MECHANISM
 from cdpr_drake.systems.scenarios.mechanism_motion import moving_joints
 from cdpr_drake.systems.scenarios.mechanism_scenario import COMPUTED_TORQUE
 
@@ -60,6 +61,8 @@ DESIRED = Look("#b8b8b8")
 
 class MechanismRun(Run):
     """A run of a mechanism; its outcome is COMPLETED, DIVERGED or INTERRUPTED."""
+
+    kind = MECHANISM
 
     @cached_property
     def built(self) -> MechanismFollower:

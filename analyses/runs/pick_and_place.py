@@ -58,6 +58,7 @@ from cdpr_drake.systems.pick_and_place.pick_and_place_task import (
 from cdpr_drake.systems.pick_and_place.tag_occlusion import COVER_COLOR, cover_plate
 from cdpr_drake.systems.pick_and_place.workpiece import GRIPPER_COLOR, placed_tags, stem
 from cdpr_drake.systems.robots.settings import model_words, simulated_model
+from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
 from cdpr_drake.systems.scenarios.pick_and_place_settings import COVERED_IN, OBJECT_TAG
 
@@ -79,6 +80,7 @@ class PickAndPlaceRun(Run):
         state: State of the task at the end; None if only the log is left.
     """
 
+    kind = PICK_AND_PLACE
     state: PickAndPlaceState | None = None
 
     @cached_property

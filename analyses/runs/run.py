@@ -88,6 +88,8 @@ class Run(Result):
     """A run of a scenario, before, during and after its simulation.
 
     Attributes:
+        kind: Of its scenario, as a file gives it.
+        sections: Subjects that a run may have, in the order of `summary.json`.
         scenario: The scenario.
         built: The diagram and its handles, made at the first use.
         robot: The robot, or the mechanism.
@@ -103,12 +105,22 @@ class Run(Result):
         chosen_end: True if the user chose the duration, which then explains a timeout.
     """
 
+    kind: ClassVar[str]
     sections: ClassVar[Sequence[Section]] = ()
     built: Any
     log: Log
 
     def __init__(self, scenario: Any) -> None:
-        """Of a scenario."""
+        """Of a scenario.
+
+        Raises:
+            ScenarioError: It is of another kind.
+        """
+        if scenario.kind != self.kind:
+            raise ScenarioError(
+                f"{scenario.name}: kind: found {scenario.kind}; accepted: {self.kind}; "
+                "cdpr_drake.simulate runs all kinds"
+            )
         self.scenario = scenario
         self.log = {}
         self.outcome, self.message, self.sim_time, self.wall_time = Outcome.RUNNING, "", 0.0, 0.0

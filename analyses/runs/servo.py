@@ -52,6 +52,7 @@ from cdpr_drake.systems.loops.servo_loop import ServoLoop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.monitoring.tension_watch import TensionExtremes
 from cdpr_drake.systems.robots.settings import COMPILED, model_words, simulated_model
+from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, engine_of
 from cdpr_drake.vision.target import PointTarget
 
@@ -116,6 +117,7 @@ class ServoRun(Run):
     Those that a run does not have, or that its log alone does not tell, are None.
     """
 
+    kind = VISUAL_SERVO
     sections = (
         subjects.MOTORS, subjects.WANTED_TENSIONS, subjects.BEHAVIOUR, *SENSING,
         subjects.TENSION_GAIN, subjects.DISTURBANCES, subjects.FAILURES, subjects.WRENCH,
@@ -126,9 +128,15 @@ class ServoRun(Run):
     torque: TorqueSteps | None = None
 
     def __init__(self, scenario: Any) -> None:
-        """Of a scenario, whose robot moves by the compiled engine in the compiled loop."""
+        """Of a scenario, whose robot moves by the compiled engine in the compiled loop.
+
+        Raises:
+            ScenarioError: It is of another kind, or the compiled loop cannot run it.
+        """
+        super().__init__(scenario)
         self.loop = COMPILED if uses_compiled_loop(scenario) else DIAGRAM
-        super().__init__(check_loop(scenario) if self.loop == COMPILED else scenario)
+        if self.loop == COMPILED:
+            self.scenario = check_loop(scenario)
 
     @cached_property
     def built(self) -> Any:

@@ -42,19 +42,12 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import (
-    MECHANISM,
-    PICK_AND_PLACE,
-    TENSION_CONTROL,
-    VISUAL_SERVO,
-    scenario_kind,
-)
+from cdpr_drake.systems.scenarios.files import MECHANISM, TENSION_CONTROL, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 KINDS: dict[str, type[Run]] = {
-    VISUAL_SERVO: ServoRun, TENSION_CONTROL: TensionRun,
-    PICK_AND_PLACE: PickAndPlaceRun, MECHANISM: MechanismRun,
-}  # fmt: skip
+    run.kind: run for run in (ServoRun, TensionRun, PickAndPlaceRun, MechanismRun)
+}
 """By the name that a scenario file gives as `kind`."""
 
 Camera = Annotated[str | None, one_of(("rendered", "projected"))]

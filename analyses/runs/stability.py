@@ -54,6 +54,10 @@ class Stability:
     margin: Array
     freedom: int
 
+    def underactuated_time(self) -> float:
+        """Time in which the rank is less than the freedom [s]."""
+        return float(np.sum(np.diff(self.time) * (self.rank[:-1] < self.freedom)))
+
     def numbers(self) -> dict[str, Any]:
         """Least margin, least rank, and time without a positive margin, as far as it is known."""
         margins = self.margin[np.isfinite(self.margin)]

@@ -60,6 +60,7 @@ from cdpr_drake.systems.robots.settings import (
     model_words,
     simulated_model,
 )
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, engine_of
 
 
@@ -70,6 +71,7 @@ class TensionRun(Run):
         loop: What stepped it: compiled, diagram, or remote; None if only the log is left.
     """
 
+    kind = TENSION_CONTROL
     sections = (FORCES, PROGRAM_STEPS, WORLD)
     loop: str | None = None
 

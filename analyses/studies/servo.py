@@ -146,8 +146,8 @@ def servo_run(
     Returns:
         outcome, message; `METRICS` and the study's own, None where there is none; summary, as
         `cdpr simulate` writes it; features, names of the components of "error"; stop_position_m,
-        the measured distance at which a run counts as converged; the arrays of `ServoRun.traces`, and
-        of `stability_curves`.
+        the measured distance at which a run counts as converged; the arrays of
+        `ServoRun.traces`, and of `stability_curves`.
     """
     items = [*changes, f"seed={seed}"]
     loaded = load_scenario(scenario, items)

@@ -16,10 +16,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiscreteValues, EventStatus
 
 from cdpr_drake.analyses.reporting.timing import interleaved, seconds_each, seconds_per_call
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.run import PIECE
 from cdpr_drake.analyses.tensions import applicable_methods
 from cdpr_drake.arrays import Array
@@ -184,8 +185,7 @@ def run_trial(spec: TensionTrial) -> dict[str, Any]:
         steps.append(np.array([now, np.sqrt(away @ away), *tensions]))
         return EventStatus.ReachedTermination(None, "lost") if lost() else EventStatus.DidNothing()
 
-    simulator = Simulator(control.diagram, context)
-    ResetIntegratorFromFlags(simulator, "runge_kutta3", STEP).set_fixed_step_mode(True)
+    simulator = fixed_step_simulator(control.diagram, context, "runge_kutta3", STEP)
     simulator.set_monitor(record)
     diverged = False
     try:

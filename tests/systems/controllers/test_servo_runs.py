@@ -6,9 +6,7 @@ Most go by the compiled loop, whose runs are those of the diagram (tests of `loo
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.analyses.runs.stability import stability_along
-from cdpr_drake.analyses.simulation.run_figures import error_figure
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.geometry.straight_cables import cable_lengths
@@ -45,7 +43,7 @@ def test_every_scheme_reaches_its_goal(robot, scheme):
     assert result.log["error"].shape[1] == len(names)
     assert result.as_dict()["controller"] == result.built.scenario.controller.scheme
     if robot == "acrobot":
-        shown = sum(len(axes.get_lines()) for axes in error_figure(result).axes[:-2])
+        shown = sum(len(axes.get_lines()) for axes in result.plot().axes[:-2])
         assert shown >= len(names)
 
 
@@ -71,7 +69,7 @@ def test_a_partition_and_a_switch_reach_their_goal(name):
     is_at_goal(result, robot)
     summary = result.as_dict()
     assert summary["controller"] == scheme
-    assert error_figure(result) is not None
+    result.plot()
     if scheme == "switching":
         mode = result.log["servo_mode"]
         assert summary["servo_switches"] == mode[-1, 1]
@@ -201,7 +199,7 @@ def test_an_open_loop_stays_on_its_plan_but_for_what_is_held(exact):
     assert summary["controller"] == "open_loop"
     assert summary["plan_deviation_m"]["max"] == pytest.approx(np.max(distance))
     assert summary["plan_deviation_m"]["mean"] < LAG
-    facts = dict(KINDS["visual_servo"].facts(summary))
+    facts = dict(exact.facts(summary))
     assert facts["from the plan"].endswith("deg")
     assert "from the straight line" not in facts
 

@@ -91,7 +91,7 @@ def test_stability_along_a_run_is_that_at_its_poses(without):
     assert np.all(along.rank == np.minimum(along.taut, 6))  # generic poses
     assert np.all(along.margin[along.rank < 6] == 0.0)
     assert np.all(along.margin[along.rank == 6] > 0.5)
-    assert along.underactuated_time() == pytest.approx(along.unstable_time())
+    assert along.underactuated_time() == pytest.approx(along.numbers()["unstable_s"])
     log, row = without.log, 40
     X, X_hat = (pose_from_row(log[name][row]) for name in ("X_WP", "X_WP_estimated"))
     taut = log["slack"][row] == 0.0

@@ -6,8 +6,8 @@ Goals of every scheme are in tests of `controllers`.
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.systems.diagrams.calibration_findings import calibration_facts, found_calibrations
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -166,7 +166,7 @@ and by 25 mm on CAROCA."""
 def look(*overrides, name="acrobot_pbvs", time=STEP):
     servo = built(name, *overrides)
     context = servo.make_context()
-    make_simulator(servo, context).AdvanceTo(time)
+    fixed_step_simulator(servo.diagram, context, "runge_kutta3", servo.max_step).AdvanceTo(time)
     return servo, servo.log.read(context)
 
 

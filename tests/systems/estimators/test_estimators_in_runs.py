@@ -9,7 +9,6 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.simulation.run_figures import run_figures
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.wrench_observers import OBSERVERS
 from cdpr_drake.geometry.poses import pose_rows_distance
@@ -36,7 +35,7 @@ def run_of(name, *changes):
 
 
 def figures(result):
-    return {name.split(".")[0] for name in run_figures(result, ("png",))}
+    return set(result.figures())
 
 
 def estimated(name, *changes):

@@ -7,8 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.reporting.log_files import write_log
-from cdpr_drake.analyses.reporting.provenance import write_run_inputs
+from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import (
     Stability,
@@ -17,8 +16,7 @@ from cdpr_drake.analyses.runs.stability import (
     stability_figure,
     turned_criterion,
 )
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.stability_files import assess_run
+from cdpr_drake.analyses.runs.along import assess_run
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError, ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -41,8 +39,9 @@ def result():
 @pytest.fixture(scope="module")
 def folder(result, tmp_path_factory):
     path = tmp_path_factory.mktemp("run")
-    write_log(path, result.log, [f"C{k}" for k in range(1, 9)], result.built.feature_names)
-    write_run_inputs(path, result.built.scenario, result.built.robot)
+    with Folder(path, {}) as results:
+        result.write_inputs(results.path)
+        result.write(results)
     return path
 
 
@@ -74,7 +73,7 @@ def test_a_log_without_the_section_has_none_of_it():
     short = ServoRun(load_scenario(SLACK, [*SHORT, "duration=0.1"])).simulate()
     assert "stability_margin" not in short.log
     assert short.as_dict()["least_jacobian_rank"] is None
-    assert "stability.png" not in run_figures(short)
+    assert "stability" not in short.figures()
 
 
 def signals(servo, tensions, slack, threshold=None, X_WP=None):

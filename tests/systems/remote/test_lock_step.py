@@ -85,7 +85,7 @@ def test_rows_of_the_log_between_control_steps():
     for how in ("integration.engine=compiled", None):
         settings = scenario("integration.engine=compiled", *rates)
         law = own_control(settings)["controller"]
-        look = None if how else (lambda simulator, diagram: None)
+        look = None if how else (lambda *_: None)
         runs.append(driven(settings, law, prepare=look)[0])
     alone = TensionRun(scenario("integration.engine=compiled", "log_rate=300")).simulate()
     assert [run.loop for run in runs] == ["remote", "diagram"]

@@ -9,9 +9,8 @@ from pydrake.geometry import Box, Role
 from pydrake.systems.analysis import InitializeParams
 
 from cdpr_drake.analyses.reporting.log_files import column_names
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance, rotation_vector
@@ -189,12 +188,12 @@ def test_each_sensor_has_its_own_rate(looking):
 
 
 def test_each_sensor_has_a_figure(looking):
-    drawn = run_figures(looking)
-    for name in ("scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"):
-        assert f"{name}.png" in drawn
+    drawn = {"scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"}
+    assert drawn <= set(looking.figures())
     assert looking.depth_image.shape == (120, 160)
-    without = replace(looking, servo=servo_of("acrobot_moving_tag", *SHORT))
-    assert "imu.png" not in run_figures(without)
+    without = ServoRun(load_scenario("acrobot_moving_tag", SHORT))
+    without.log = looking.log
+    assert "imu" not in without.figures()
 
 
 def test_a_beam_on_the_head_ends_where_the_head_says():
@@ -289,14 +288,14 @@ def test_a_run_that_is_continued_reads_the_same():
     """Biases, odometry and the head are state; all that is random goes by the sample's number."""
     servo = servo_of(LOOKING, *NO_DEPTH, "duration=0.2")
     context = servo.make_context()
-    simulator = make_simulator(servo, context)
+    simulator = fixed_step_simulator(servo.diagram, context, "runge_kutta3", servo.max_step)
     simulator.AdvanceTo(0.1)
     assert has_arrays_only(context)
     kept = {name: values.copy() for name, values in state_arrays(context).items()}
     simulator.AdvanceTo(0.2)
     again = servo.make_context()
     restore_state(again, kept)
-    simulator = make_simulator(servo, again)
+    simulator = fixed_step_simulator(servo.diagram, again, "runge_kutta3", servo.max_step)
     params = InitializeParams()
     params.suppress_initialization_events = True
     simulator.Initialize(params)
