@@ -48,6 +48,7 @@ class Follow:
         say: Gets a line on what happens.
         results: Folder below which results are kept that nobody gave a folder; None: none are.
         prepare: Gets a run, Drake's simulator and the diagram before the run starts.
+        acts: True if what was prepared may change the run, which then cannot go on after a kill.
         connect: Brings a process outside to its place in the loop of a run, a `Remote`.
         ended: Gets a run when it has ended, before its files are written.
     """
@@ -57,6 +58,7 @@ class Follow:
     say: Callable[[str], None] = lambda words: None
     results: Path | None = None
     prepare: Callable[[Any, Any, Any], None] | None = None
+    acts: bool = False
     connect: Callable[[Any], None] | None = None
     ended: Callable[[Any], None] = lambda run: None
 

@@ -208,12 +208,13 @@ class Run(Result):
         parts = None if folder is None else folder / PARTS
         resume = parts is not None and (parts / CHECKPOINT).is_file()
         engine = self.engine(follow, resume)
-        if engine.remote is not None and parts is not None and parts.is_dir():
+        repeatable = engine.remote is None and not follow.acts
+        if not repeatable and parts is not None and parts.is_dir():
             raise OutputFolderError(
                 f"{folder}: found the log of a run with a process outside, which cannot go on; "
                 "accepted: cdpr finish, or another folder"
             )
-        recorder = Recorder(engine, parts, checkpoints=engine.remote is None)
+        recorder = Recorder(engine, parts, checkpoints=repeatable)
         began = time.perf_counter() - (recorder.earlier or 0.0)
         if engine.remote is not None and follow.connect is not None:
             follow.connect(engine.remote)

@@ -33,6 +33,7 @@ from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun
 from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.servo_figures import FILM, write_film
+from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.errors import OutputFolderError, ScenarioError
@@ -110,21 +111,22 @@ def simulate(
     if meshcat:
         follow = replace(follow, prepare=_in_meshcat(run, host or LOCAL, port, follow))
     elif steered_by is not None:
-        follow = replace(follow, prepare=_steered(run, steered_by, follow))
+        follow = steered(follow, loaded, steered_by)
     follow.doing(f"{loaded.name}: building the diagram")
     warnings = run.check()
     for line in [note, *(f"warning: {warning}" for warning in warnings)]:
         if line:
             follow.say(line)
-    base = f"runs/{loaded.name}"
-    with results_folder(base, run.arguments(), folder, overwrite, follow.results) as results:
+    base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
+    with results_folder(base, arguments, folder, overwrite, follow.results) as results:
         if results is None:
             return run.simulate(None, follow)
-        with results.files() as stage:
-            run.write_inputs(stage)
+        _write_inputs(run, results)
         with results.writing():
             results.claim(PARTS)
             run.simulate(results.path, follow)
+        if follow.acts:  # what was done by hand stands in the scenario now
+            _write_inputs(run, results)
         run.write(results)
         if run.outcome != Outcome.INTERRUPTED:
             run.draw(results, formats, _exports(run, results, exports, video), follow)
@@ -213,6 +215,11 @@ def _check_options(
         raise ScenarioError("meshcat, steered_by: found together; accepted: one of them")
 
 
+def _write_inputs(run: Run, results: Folder) -> None:
+    with results.files() as stage:
+        run.write_inputs(stage)
+
+
 def _exports(
     run: Run, results: Folder, formats: Sequence[str], video: bool
 ) -> Mapping[str, Callable[[Path], object]]:
@@ -228,14 +235,3 @@ def _in_meshcat(run: Run, host: str, port: int | None, follow: Follow) -> Callab
     follow.say(f"{run.scenario.name} at {page_address(meshcat, host)}")
     show: Any = run.live(meshcat)
     return lambda _, simulator, diagram: show(simulator, diagram)
-
-
-def _steered(run: Run, descriptor: int, follow: Follow) -> Callable[..., None]:
-    from cdpr_drake.analyses.simulation.live_control import Steering
-    from cdpr_drake.analyses.simulation.live_messages import open_connection
-
-    stop: Any = follow.stop
-    steering = Steering(
-        run.scenario, open_connection(descriptor), should_stop=stop, ask_stop=stop.ask
-    )
-    return lambda _, simulator, diagram: steering.prepare(simulator, diagram)

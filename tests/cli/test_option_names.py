@@ -6,7 +6,7 @@ from cdpr_drake.cli.simulate import PYTHON_NAMES
 from cdpr_drake.analyses.front.calibration import calibrate
 from cdpr_drake.analyses.front.simulated_fits import calibrate_in_simulation, identify_in_simulation
 from cdpr_drake.analyses.runs.simulate import simulate
-from cdpr_drake.analyses.simulation.live_messages import open_connection
+from cdpr_drake.analyses.runs.steering import open_connection
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.workspaces.workspace import compute_workspace

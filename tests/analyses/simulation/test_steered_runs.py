@@ -8,11 +8,20 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH, UNTOUCHED, ByHand
-from cdpr_drake.analyses.simulation.live_control import Steering, check_steered
-from cdpr_drake.analyses.simulation.live_messages import Message, open_connection, receive, send
-from cdpr_drake.analyses.simulation.mark_images import MarksPicture
-from cdpr_drake.analyses.simulation.realtime_rate import RealtimeRate
+from cdpr_drake.analyses.runs.steering import (
+    BREAK,
+    PUSH,
+    UNTOUCHED,
+    ByHand,
+    MarksPicture,
+    Message,
+    RealtimeRate,
+    Steering,
+    check_steered,
+    open_connection,
+    receive,
+    send,
+)
 from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
