@@ -1,1 +1,1 @@
-"""Tests of `cdpr_drake.analyses.simulation`."""
+"""Tests of runs."""

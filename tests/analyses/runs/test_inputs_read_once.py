@@ -1,4 +1,4 @@
-"""A result is of files as they were at first; `test_many_runs` has one that is edited meanwhile."""
+"""A result is of files as they were at first; `test_seeds` has one that is edited meanwhile."""
 
 import hashlib
 import json
