@@ -1,1 +1,1 @@
-"""Tests of `cdpr_drake.analyses.runs`."""
+"""Tests of runs."""

@@ -233,7 +233,7 @@ def test_a_wrong_model_leaves_the_plan_beside_the_goal_where_servoing_arrives():
 def test_a_wrong_start_shifts_the_whole_way():
     blind = compiled_run("acrobot_pbvs", PLAN, "perturbations.initial_pose_shift.distance=0.02")
     final = pose_from_row(blind.log["X_WP"][-1])
-    assert pose_error(final, blind.servo.desired_platform_pose())[0] > 0.01
+    assert pose_error(final, blind.built.desired_platform_pose())[0] > 0.01
 
 
 def test_an_open_loop_passes_its_waypoints_and_returns():

@@ -21,6 +21,7 @@ from cdpr_drake.systems.controllers.correction_laws import (
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.tension_management import automatic_gain
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
@@ -95,13 +96,13 @@ def test_stability_along_a_run_is_that_at_its_poses(without):
     log, row = without.log, 40
     X, X_hat = (pose_from_row(log[name][row]) for name in ("X_WP", "X_WP_estimated"))
     taut = log["slack"][row] == 0.0
-    again = run_criterion(without.servo).at(X, X_hat, taut, float(log["time"][row]))
+    again = run_criterion(without).at(X, X_hat, taut, float(log["time"][row]))
     assert again == (along.rank[row], along.margin[row])
 
 
 def test_a_perfect_belief_has_the_margin_one():
     servo = build_visual_servo(load("perturbations.slack=null", "cables.pulleys=false"))
-    X_WP, criterion = servo.scenario.initial_pose.transform(), run_criterion(servo)
+    X_WP, criterion = servo.scenario.initial_pose.transform(), criterion_of(servo, False)
     for taut in (np.ones(8, bool), np.arange(8) != 3, np.arange(8) > 1):
         rank, margin = criterion.at(X_WP, X_WP, taut, 0.0)
         assert rank == 6

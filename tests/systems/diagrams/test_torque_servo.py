@@ -8,6 +8,7 @@ import pytest
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.torque_control import loop_warnings
 from tests.systems.diagrams.diagram_cases import ENGINE, PLATFORM_TAG, PROJECTED
@@ -73,12 +74,13 @@ def test_the_last_cable_to_come_taut_stays_above_the_limit_where_its_winch_once_
 def test_excess_is_counted_where_limits_are_too_narrow(slack_start):
     report = slack_start.torque
     upper = float(report.extremes.highest.max()) - 0.5
-    assert replace(report, limits=(1.0, upper)).excess() == pytest.approx(0.5)
+    found = replace(report, limits=(1.0, upper)).numbers(TorqueControl())
+    assert found["largest_excess_n"] == pytest.approx(0.5)
 
 
 def test_motor_torques_are_tensions_by_radius_over_gear(slack_start):
     """In the mean over time, as friction and what accelerates the motors are left out."""
-    log, law = slack_start.log, slack_start.servo.robot.winch_law()
+    log, law = slack_start.log, slack_start.built.robot.winch_law()
     later = log["time"] > 0.9
     rho = law.drum.radius / law.drum.gear_ratio
     pull = (log["friction_torques"] - log["applied_torques"])[later].mean(axis=0) / rho

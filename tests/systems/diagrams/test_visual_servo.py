@@ -81,7 +81,7 @@ def test_the_other_robots_converge(name):
 
 def test_acrobot_converges_and_its_log_tells_the_run(acrobot_run):
     arrives(acrobot_run, "acrobot_pbvs")
-    servo, log = acrobot_run.servo, acrobot_run.log
+    servo, log = acrobot_run.built, acrobot_run.log
     rows = len(log["time"])
     assert {name: values.shape for name, values in log.items()} == {
         "time": (rows,), "X_WP": (rows, 7), "X_WP_estimated": (rows, 7),

@@ -141,7 +141,7 @@ def test_learnt_points_are_told_with_the_truth_beside_them(learnt):
 
 
 def test_the_servo_goes_by_the_believed_points(learnt):
-    believed, controller = learnt.log["believed_points"], learnt.servo.servo.controller
+    believed, controller = learnt.log["believed_points"], learnt.built.servo.controller
     assert np.any(believed[-1] != believed[0])
     rows = controller._cable_rows
     # The last rows of the log: the servo's last step may be older than the last model.

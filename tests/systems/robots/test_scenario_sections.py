@@ -207,9 +207,9 @@ def test_torques_are_logged_with_their_units(friction_run):
     names = column_names(friction_run.log, cables, ["feature"] * 6)
     assert "applied_torques.C1_nm" in names
     assert "friction_torques.C8_nm" in names
-    friction = friction_run.servo.robot.winch_law().friction
+    friction = friction_run.built.robot.winch_law().friction
     taken = np.abs(friction_run.log["friction_torques"])
-    fastest = friction_run.servo.robot.winch.rated_motor_speed()
+    fastest = friction_run.built.robot.winch.rated_motor_speed()
     assert np.max(taken) <= friction.static + friction.viscous * fastest
     assert np.max(taken) > friction.coulomb
 

@@ -8,7 +8,6 @@ import yaml
 from pydrake.geometry import Box, Role
 from pydrake.systems.analysis import InitializeParams
 
-from cdpr_drake.analyses.reporting.log_files import column_names
 from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.cli.app import main
@@ -51,11 +50,10 @@ def looking():
 
 
 def test_all_readings_are_logged_with_their_units(reading, looking):
-    cables = [f"C{i}" for i in range(1, 9)]
-    assert set(column_names(reading.log, cables, ["feature"] * 6)) >= {
+    assert set(reading.columns()) >= {
         "measured_tensions.C1_n", "measured_lengths.C8_m", "X_WP_measured.x_m", "X_WP_metrology.qw",
     }  # fmt: skip
-    assert set(column_names(looking.log, cables, looking.servo.feature_names)) >= {
+    assert set(looking.columns()) >= {
         "scan_front.681_m", "scan_beam.0_m", "specific_force.z_m_s2", "angular_velocity.x_rad_s",
         "imu_biases.wz_rad_s", "depth_row.159_m", "pan_tilt_encoders.tilt_rad",
         "X_WO_odometry.qw", "wheel_distances.right_m",
@@ -175,7 +173,7 @@ def test_a_loop_without_a_diagram_leaves_sensors_of_a_scene_to_a_diagram():
 
 def test_odometry_is_right_at_the_start_and_drifts(looking):
     rows = looking.log["X_WO_odometry"]
-    start = looking.servo.motion.at(0.0).translation()
+    start = looking.built.motion.at(0.0).translation()
     np.testing.assert_allclose(rows[0, 4:], start, atol=1e-12)
     distance, _ = pose_rows_distance(rows[-1:], rows[:1])
     assert distance[0] > 1e-3

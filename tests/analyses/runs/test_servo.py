@@ -5,9 +5,8 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import KINDS
-from cdpr_drake.analyses.simulation.session import RunSession
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import (
     pose_error,
@@ -58,7 +57,7 @@ def test_a_region_of_interest_says_how_many_images_were_whole():
     ).simulate()
     summary = result.as_dict()
     assert summary["images"] == {"taken": 5, "whole": 1}
-    images = dict(KINDS["visual_servo"].facts(summary))["images"]
+    images = dict(result.facts(summary))["images"]
     assert images == "5, of which 1 whole"
 
 
@@ -77,7 +76,7 @@ def projected_run():
 def test_surplus_and_drift_are_those_of_the_log(projected_run):
     summary, log = projected_run.as_dict(), projected_run.log
     row = int(np.argmax(np.max(log["surplus_lengths"], axis=1)))
-    cables = projected_run.servo.cable_robot.forces.cable_set()
+    cables = projected_run.built.cable_robot.forces.cable_set()
     straight = cable_paths(pose_from_row(log["X_WP"][row]), cables).lengths
     largest = np.max(log["unstrained_lengths"][row] - straight)
     assert largest > 0.0
@@ -153,25 +152,19 @@ def test_diverged_when_the_platform_leaves_the_frame(tmp_path):
 
 def test_stop_request_keeps_what_was_simulated():
     seen = []
-    result = ServoRun(projected()).simulate(
-        on_progress=seen.append, should_stop=lambda: len(seen) >= 5
-    )
+    follow = Follow(seen.append, lambda: len(seen) >= 5)
+    result = ServoRun(projected()).simulate(follow=follow)
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.5)
     assert len(result.log["time"]) == 26
 
 
-def test_a_field_that_a_session_has_not_is_refused():
-    with pytest.raises(TypeError, match="resumed"):
-        ServoRun(projected()).simulate(resumed=True)
-
-
 def test_keyboard_interrupt_keeps_what_was_simulated():
     def interrupt(progress):
-        if progress.sim_time > 0.25:
+        if progress.done > 0.25:
             raise KeyboardInterrupt
 
-    result = ServoRun(projected()).simulate(RunSession(interrupt))
+    result = ServoRun(projected()).simulate(follow=Follow(interrupt))
     assert result.outcome == Outcome.INTERRUPTED
     assert result.sim_time == pytest.approx(0.3)
 

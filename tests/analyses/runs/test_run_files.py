@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
-from cdpr_drake.analyses.reporting.log_files import column_names
+from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.simulation.run_files import run_pictures, write_run_data
+from cdpr_drake.analyses.runs.servo_figures import FILM, write_film
 from cdpr_drake.analyses.visualization.replay import write_replay
 from cdpr_drake.systems.diagrams.load import load_scenario
 
@@ -26,13 +26,22 @@ SUMMARY_KEYS = {
 FIGURES = ("image_path", "error", "cable_velocities", "cable_lengths", "tensions", "platform_path")
 
 
+def written(result, folder, film=True):
+    """A folder with the files of a run."""
+    with Folder(folder, {}) as results:
+        with results.files() as stage:
+            result.write_inputs(stage)
+        result.write(results)
+        films = {FILM: lambda path: write_film(result, path)} if film else {}
+        result.draw(results, exports=films)
+    assert result.failed == {}
+    return folder
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
     result = ServoRun(load_scenario("acrobot_pbvs", [*SHORT, "duration=0.4"])).simulate()
-    write_run_data(folder, result)
-    assert write_pictures(folder, run_pictures(result, True)) == {}
-    return folder, result
+    return written(result, tmp_path_factory.mktemp("run")), result
 
 
 def test_summary_has_the_promised_keys(run):
@@ -52,20 +61,17 @@ def test_npz_and_csv_hold_the_same_log(run):
         table = np.column_stack([arrays[name] for name in result.log])
     with (folder / "log.csv").open(newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == column_names(
-        result.log, [f"C{i}" for i in range(1, 9)], result.built.feature_names
-    )
+    assert rows[0] == list(result.columns()) == list(result.to_dataframe())
     assert len(set(rows[0])) == len(rows[0])
     np.testing.assert_array_equal(np.array(rows[1:], float), table)
 
 
 def test_the_written_scenario_runs_again_to_the_same_bytes(run, tmp_path):
-    folder, result = run
-    write_run_data(tmp_path, ServoRun(load_scenario(str(folder / "scenario.yaml"))).simulate())
-    for name in ("log.npz", "log.csv"):
-        assert (folder / name).read_bytes() == (tmp_path / name).read_bytes()
-    write_run_data(tmp_path, result)
-    assert (folder / "scenario.yaml").read_bytes() == (tmp_path / "scenario.yaml").read_bytes()
+    folder, _ = run
+    again = ServoRun(load_scenario(str(folder / "scenario.yaml"))).simulate()
+    written(again, tmp_path, film=False)
+    for name in ("log.npz", "log.csv", "scenario.yaml", "robot.yaml"):
+        assert (folder / name).read_bytes() == (tmp_path / name).read_bytes(), name
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -79,7 +85,7 @@ def test_replay_shows_what_the_film_shows_and_where_the_target_should_be(run):
     page = (run[0] / "replay.html").read_text()
     assert 'src="http' not in page  # no server is needed
     (words,) = re.findall(r'id="cdpr-data">(.*?)</script>', page, re.DOTALL)
-    camera, servo = json.loads(words)["camera"], run[1].servo
+    camera, servo = json.loads(words)["camera"], run[1].built
     times = [time for time, _ in camera["images"]]
     np.testing.assert_allclose(times, [0.0, 0.2, 0.4])
     assert all(image.startswith("data:image/jpeg;base64,") for _, image in camera["images"])
@@ -121,33 +127,29 @@ def test_film_has_a_frame_per_image(run):
 )
 def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expected, tmp_path):
     result = ServoRun(load_scenario(name, [*SHORT, "duration=0.1"])).simulate()
-    write_run_data(tmp_path, result)
-    pictures = run_pictures(result, True)
-    figures = {f"{figure}.png": pictures[f"{figure}.png"] for figure in FIGURES}
-    if name == "acrobot_circles":  # whose marks are others in the replay and the film, too
-        figures = pictures
-    assert write_pictures(tmp_path, figures) == {}
+    written(result, tmp_path, film=name == "acrobot_circles")  # whose marks are others
     assert {path.name for path in tmp_path.glob("*.png")} >= {f"{name}.png" for name in FIGURES}
-    with (tmp_path / "log.csv").open(newline="") as file:
-        columns = next(csv.reader(file))
+    columns = (tmp_path / "log.csv").read_text().partition("\n")[0].split(",")
     assert set(expected) <= set(columns)
     assert len(set(columns)) == len(columns)
 
 
-def test_a_picture_that_fails_is_named_and_the_others_are_there(run, tmp_path):
+def test_a_figure_that_fails_is_named_and_the_others_are_there(run, tmp_path, monkeypatch):
     """Data comes first; what fails after it takes nothing with it, and leaves no half file."""
-    pictures = run_pictures(run[1])
+    figures = run[1].figures()
 
-    def fail(path):
-        path.write_text("half")
+    def fail():
         raise RuntimeError("no font\nmore words")
 
-    failed = write_pictures(tmp_path, {"error.png": fail, "tensions.png": pictures["tensions.png"]})
-    assert failed == {"error.png": "no font"}
-    assert [path.name for path in tmp_path.iterdir()] == ["tensions.png"]
+    drawn = {"error": fail, "tensions": figures["tensions"]}
+    monkeypatch.setattr(ServoRun, "figures", lambda _: drawn)
+    with Folder(tmp_path, {}) as results:
+        run[1].draw(results)
+    assert run[1].failed == {"error.png": "no font"}
+    assert {path.name for path in tmp_path.glob("[!.]*")} == {"tensions.png", "replay.html"}
 
 
-def test_no_picture_is_begun_after_a_request_to_stop(run, tmp_path):
-    failed = write_pictures(tmp_path, run_pictures(run[1]), should_stop=lambda: True)
-    assert "replay.html" in failed
+def test_no_figure_is_begun_after_a_request_to_stop(run, tmp_path):
+    with Folder(tmp_path, {}) as results:
+        run[1].draw(results, follow=Follow(stop=lambda: True))
     assert list(tmp_path.iterdir()) == []

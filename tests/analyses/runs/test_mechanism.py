@@ -2,26 +2,19 @@
 
 import json
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from cdpr_drake.analyses.runs.mechanism import MechanismRun
-from cdpr_drake.analyses.runs.simulate import KINDS
-from cdpr_drake.analyses.simulation import log_keeper
-from cdpr_drake.analyses.simulation.mechanism_figures import mechanism_pictures
-from cdpr_drake.analyses.simulation.mechanism_run import check_mechanism_run, mechanism_facts
-from cdpr_drake.analyses.simulation.run_loop import advance
-from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
-from tests.analyses.simulation.resumed_runs import assert_it_goes_on_to_the_same_bytes
+from tests.analyses.runs.test_simulate import interrupted
 from tests.cli.commands import refuse, run
 
-RUN = "cdpr_drake.analyses.simulation.mechanism_run"
 ARM, BASES = "cable_arm_computed_torque", "mobile_bases_winches"
 
 BETWEEN_STEPS = 1e-3
@@ -92,7 +85,7 @@ def test_bases_drive_and_a_platform_follows_on_winches(bases):
     assert distance < expected.position
     assert np.degrees(angle) < expected.rotation_deg
     # Winches are where they should be at every step: the lengths at the strains of the start.
-    log, follower = bases.log, bases.follower
+    log, follower = bases.log, bases.built
     context = follower.plant.CreateDefaultContext()
     lengths = []
     for q in log["wanted_positions"]:
@@ -130,7 +123,7 @@ def test_free_bodies_come_first_in_velocities_but_last_among_joints():
     follower = ran(
         BASES, "mechanism=arm_on_platform", "duration=0.01", "control.prestress=10",
         "motion.waypoints=[{time: 1.0, joints: {elbow: -0.5}}]",
-    ).follower  # fmt: skip
+    ).built  # fmt: skip
     plant, names = follower.plant, follower.velocity_names()
     shoulder = plant.GetJointByName("shoulder")
     assert names[shoulder.velocity_start()] == "arm_on_platform::shoulder"
@@ -146,59 +139,41 @@ def test_free_bodies_come_first_in_velocities_but_last_among_joints():
 
 def test_a_run_that_is_stopped_keeps_what_it_has():
     seen = []
-    done = MechanismRun(load_scenario(BASES)).simulate(
-        RunSession(seen.append, lambda: len(seen) >= 3)
-    )
+    follow = Follow(seen.append, lambda: len(seen) >= 3)
+    done = MechanismRun(load_scenario(BASES)).simulate(follow=follow)
     assert done.outcome == Outcome.INTERRUPTED
     assert done.sim_time == pytest.approx(0.3)
     assert done.as_dict()["outcome"] == "interrupted"
 
 
-@pytest.mark.parametrize("name", [ARM, BASES])
-def test_a_run_that_was_killed_goes_on_to_the_same_bytes(tmp_path, monkeypatch, name):
-    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
-    kind, wanted = KINDS["mechanism"], load_scenario(name, ["duration=0.5"])
-    assert_it_goes_on_to_the_same_bytes(kind, wanted, tmp_path)
-
-
 def test_the_command_goes_on_in_its_folder(whole, capsys, tmp_path, monkeypatch):
-    """Which names mechanism and bodies elsewhere than the scenario that was asked for did."""
+    """The folder's scenario names mechanism and bodies elsewhere than the command's scenario."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(log_keeper, "CHECKPOINT_WAIT", 0.0)
-    monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
-    with monkeypatch.context() as patch:
-        patch.setattr(f"{RUN}.advance", lambda simulator, duration, *others: advance(
-            simulator, duration, *others[:2],
-            replace(others[2], should_stop=lambda: simulator.get_context().get_time() > 0.15),
-            *others[3:],
-        ))  # fmt: skip
-        assert run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out")[0] == 130
+    scenario = load_scenario(BASES, ["duration=0.4"])
+    interrupted(scenario, tmp_path / "out", 0.15)
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
-    bases = tmp_path / "out" / "mechanism.yaml"
-    words = bases.read_text()
-    bases.write_text(words.replace("lower: 2.0", "lower: 3.0"))
-    said = refuse(capsys, "simulate", "--continue", "out")
-    assert "tension_bounds.lower is 2.0 there, 3.0 here" in said
-    bases.write_text(words)
-    assert run(capsys, "simulate", "--continue", "out")[0] == 0
+    changed = ("--set", "control.prestress=30")
+    words = refuse(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out", *changed)
+    assert "scenario.control.prestress is 50.0 there, 30.0 here" in words
+    assert run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out")[0] == 0
     for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
         assert (tmp_path / "out" / name).read_bytes() == (whole / name).read_bytes(), name
 
 
 def test_a_step_that_is_too_long_is_told_and_the_run_diverges():
     coarse = load_scenario(BASES, ["integration.max_step=0.05", "control.rate=20", "duration=1"])
-    (warning,) = [one for one in check_mechanism_run(coarse) if "max_step" in one]
+    (warning,) = [one for one in MechanismRun(coarse).check() if "max_step" in one]
     assert "accepted: at most 0.0036 s" in warning
     done = MechanismRun(coarse).simulate()
     assert done.outcome == Outcome.DIVERGED
     summary = done.as_dict()
     json.dumps(summary, allow_nan=False)
-    assert mechanism_facts(summary)
+    assert done.facts(summary)
 
 
 def test_a_motion_that_is_cut_is_told():
-    assert check_mechanism_run(load_scenario(BASES)) == []
-    (warning,) = check_mechanism_run(load_scenario(ARM, ["duration=1.5"]))
+    assert MechanismRun(load_scenario(BASES)).check() == []
+    (warning,) = MechanismRun(load_scenario(ARM, ["duration=1.5"])).check()
     assert "the last of motion.waypoints is at 2 s" in warning
 
 
@@ -221,16 +196,14 @@ def test_command_writes_a_folder_that_runs_again(whole):
     assert {"time", "tensions", "slack", "places"} == set(data["frames"])
 
 
-def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
+def test_the_figure_of_what_computed_torque_could_not_do():
     """Limits that the motion does not keep, while the places where it rests do."""
     way = "motion.waypoints=[{time: 0.15, joints: {elbow: -0.4}}]"
     done = ran(ARM, way, "duration=0.3", "control.limits=[2, 40]")
     summary = done.as_dict()
     assert summary["infeasible_steps"] > 0
-    pictures = mechanism_pictures(done)
-    assert "motor_forces.png" not in pictures
-    pictures["error.png"](tmp_path / "error.png")
-    assert (tmp_path / "error.png").stat().st_size > 10_000
+    assert "motor_forces" not in done.figures()
+    assert done.plot("error").axes[0].get_legend().get_texts()[-1].get_text().startswith("no tens")
 
 
 @pytest.mark.parametrize(
@@ -238,7 +211,7 @@ def test_pictures_of_what_computed_torque_could_not_do(tmp_path):
     [
         (("simulate", ARM, "--meshcat"), "--meshcat: found with the kind mechanism"),
         (("simulate", ARM, "--seeds", "0:2"), "accepted: with visual servos"),
-        (("simulate", ARM, "--video"), "has no camera"),
+        (("simulate", ARM, "--video"), "--video: found with a mechanism; accepted: with a visual"),
         (("serve", ARM), "kind: found mechanism; accepted by cdpr serve"),
     ],
 )

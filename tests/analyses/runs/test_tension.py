@@ -1,22 +1,16 @@
 """Runs of dynamic control: tracking, outcomes, files, the command; a summary by hand."""
 
 import json
-from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
+import cdpr_drake as cdpr
+from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.runs.engine import DiagramEngine
 from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.tension_control_run import (
-    make_control,
-    make_simulator,
-    tension_pictures,
-    write_tension_data,
-)
 from cdpr_drake.cli.app import main
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -47,12 +41,9 @@ def test_every_scenario_tracks_its_trajectory(name):
 
 
 def test_same_scenario_same_bytes(tmp_path):
-    scenario = load_scenario("caroca_computed_torque", ["duration=0.3"])
     for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        run = TensionRun(scenario).simulate()
-        write_tension_data(tmp_path / folder, run)
-    assert write_pictures(tmp_path / "a", tension_pictures(run)) == {}
+        run = cdpr.simulate("caroca_computed_torque", duration=0.3, folder=tmp_path / folder)
+    assert run.failed == {}
     for name in ("log.npz", "log.csv", "scenario.yaml"):
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
     again = load_scenario(str(tmp_path / "a" / "scenario.yaml"))
@@ -74,7 +65,7 @@ def test_infeasible_requests_are_counted_and_the_run_goes_on():
 def test_stop_request():
     seen = []
     scenario = load_scenario("planar_computed_torque")
-    run = TensionRun(scenario).simulate(RunSession(seen.append, lambda: len(seen) >= 3))
+    run = TensionRun(scenario).simulate(follow=Follow(seen.append, lambda: len(seen) >= 3))
     assert run.outcome == Outcome.INTERRUPTED
     assert run.sim_time == pytest.approx(0.3)
     assert np.all(np.isfinite(run.log["X_WP"]))
@@ -88,16 +79,6 @@ def test_command(capsys, tmp_path):
     summary = json.loads(printed(capsys).out)
     assert summary["kind"] == "tension_control"
     assert (tmp_path / "out" / "replay.html").exists()
-
-
-@pytest.mark.parametrize("option", ["--camera projected", "--video"])
-def test_command_has_no_camera(capsys, tmp_path, monkeypatch, option):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", "planar_computed_torque", *option.split()])
-    assert ended.value.code == 2
-    assert "has no camera" in printed(capsys).err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_control_step_that_is_far_too_long_diverges_with_what_was_logged():
@@ -139,10 +120,10 @@ def run():
         "tensions": tensions,
         "failures": np.array([[0.0], [2.0], [5.0]]),
     }
-    return TensionRun(
-        scenario=scenario, control=make_control(scenario), log=log, outcome=Outcome.COMPLETED,
-        message="why", sim_time=1.0, wall_time=0.25,
-    )  # fmt: skip
+    run = TensionRun(scenario)
+    run.log, run.outcome, run.message = log, Outcome.COMPLETED, "why"
+    run.sim_time, run.wall_time = 1.0, 0.25
+    return run
 
 
 def test_every_number_is_that_of_the_log(run):
@@ -181,16 +162,19 @@ def test_every_number_is_that_of_the_log(run):
 
 
 def test_what_a_run_cannot_have_is_none(run):
-    assert replace(run, wall_time=0.0).as_dict()["realtime_factor"] is None
-    assert replace(run, wall_time=1.0).as_dict()["realtime_factor"] == 1.0
-    first = {key: values[:1] for key, values in run.log.items()}
-    found = replace(run, log=first, outcome=Outcome.DIVERGED).as_dict()
+    first = TensionRun(run.scenario)
+    first.log = {key: values[:1] for key, values in run.log.items()}
+    first.outcome = Outcome.DIVERGED
+    found = first.as_dict()
+    assert found["realtime_factor"] is None
     assert found["tension_n"] == {"min": None, "max": None}
     assert found["outcome"] == "diverged"
 
 
 def test_the_integrator_is_that_of_the_scenario(run):
-    simulator = make_simulator(run.built, run.scenario)
+    engine = run.engine(Follow(prepare=lambda *_: None), False)
+    assert isinstance(engine, DiagramEngine)
+    simulator = engine._simulator(engine.context)
     assert simulator.get_integrator().get_fixed_step_mode()
     assert simulator.get_integrator().get_maximum_step_size() == 0.002
     X_WP = run.built.in_plant.pose(

@@ -5,7 +5,7 @@ import pytest
 
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import robot_file
@@ -68,8 +68,9 @@ def test_a_rendered_camera_sees_the_platform_where_the_engine_has_it():
 
 
 def test_accuracy_and_the_semi_implicit_method_can_be_asked_for():
+    short = (PROJECTED, COMPILED, "duration=0.3")
     careful, stable = (
-        ServoRun(load_scenario("acrobot_pbvs", [PROJECTED, COMPILED, "duration=0.3", *more])).simulate()
+        ServoRun(load_scenario("acrobot_pbvs", [*short, *more])).simulate()
         for more in (["integration.accuracy=1e-8"],
                      ["integration.integrator=semi_implicit", "integration.max_step=0.01"])
     )  # fmt: skip
@@ -125,10 +126,10 @@ def test_commanded_tensions_lead_the_platform_the_same_way():
 
 def test_commanded_tensions_run_as_one_compiled_loop_with_the_numbers_of_the_diagram(tmp_path):
     scenario = load_scenario("planar_computed_torque", ["duration=0.35", COMPILED])
-    loop = TensionRun(scenario).simulate(RunSession(log_folder=tmp_path / "log"))
+    loop = TensionRun(scenario).simulate(tmp_path)
     seen = []
-    look = RunSession(prepare=lambda _, built: seen.append(built))
-    diagram = TensionRun(scenario).simulate(look)
+    follow = Follow(prepare=lambda run, simulator, built: seen.append(built))
+    diagram = TensionRun(scenario).simulate(follow=follow)
     assert seen[0] is diagram.built.diagram
     assert loop.outcome == diagram.outcome == Outcome.COMPLETED
     assert loop.sim_time == diagram.sim_time == 0.35
@@ -143,7 +144,7 @@ def test_a_compiled_loop_that_leaves_the_frame_ends_as_the_diagram_does():
     overrides = ["duration=8.0", COMPILED, "controller.rate=6"]
     scenario = load_scenario("acrobot_computed_torque", overrides)
     loop = TensionRun(scenario).simulate()
-    diagram = TensionRun(scenario).simulate(RunSession(prepare=lambda *_: None))
+    diagram = TensionRun(scenario).simulate(follow=Follow(prepare=lambda *_: None))
     assert loop.outcome == diagram.outcome == Outcome.DIVERGED
     assert loop.sim_time == pytest.approx(diagram.sim_time)
     assert loop.message == diagram.message
