@@ -6,7 +6,6 @@ import pytest
 
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.checks import (
-    check_length,
     check_start,
     goal_warnings,
     sheave_warnings,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import robot_file

@@ -6,8 +6,8 @@ import re
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
