@@ -154,7 +154,7 @@ def test_the_command_goes_on_in_its_folder(whole, capsys, tmp_path, monkeypatch)
     assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
     changed = ("--set", "control.prestress=30")
     words = refuse(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out", *changed)
-    assert "scenario.control.prestress is 50.0 there, 30.0 here" in words
+    assert "scenario.control.prestress is 60.0 there, 30.0 here" in words
     assert run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out")[0] == 0
     for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
         assert (tmp_path / "out" / name).read_bytes() == (whole / name).read_bytes(), name
@@ -210,7 +210,7 @@ def test_the_figure_of_what_computed_torque_could_not_do():
     ("arguments", "words"),
     [
         (("simulate", ARM, "--meshcat"), "--meshcat: found with the kind mechanism"),
-        (("simulate", ARM, "--seeds", "0:2"), "accepted: with visual servos"),
+        (("simulate", ARM, "--seeds", "0:2"), "accepted: visual servos"),
         (("simulate", ARM, "--video"), "--video: found with a mechanism; accepted: with a visual"),
         (("serve", ARM), "kind: found mechanism; accepted by cdpr serve"),
     ],
