@@ -229,6 +229,13 @@ class Folder:
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
         return failed
 
+    def discard(self) -> None:
+        """Removes what was written: nothing was computed."""
+        for name in self._files:
+            if (self.path / name).exists():
+                _remove(self.path / name)
+        self._files = []
+
     def complete(self) -> None:
         """Marks the results as complete, and writes hashes of the files of users that were read."""
         files = inputs_held()

@@ -60,10 +60,6 @@ if TYPE_CHECKING:
 PIECE = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
-CLIENT_ENDED = 4
-"""Exit code of a command whose run ended as the process outside had gone."""
-
-
 @dataclass(frozen=True)
 class Section:
     """A subject of a run: its numbers in the summary, its figures, or both; see `Run.sections`.
@@ -413,4 +409,4 @@ class Run(Result):
         """Of a command that ends with it."""
         if self.stopped:
             return STOPPED
-        return CLIENT_ENDED if self.outcome == Outcome.CLIENT_ENDED else 0
+        return ClientEndedError.exit_code if self.outcome == Outcome.CLIENT_ENDED else 0

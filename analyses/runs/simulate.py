@@ -123,8 +123,13 @@ def simulate(
             return run.simulate(None, follow)
         _write_inputs(run, results)
         with results.writing():
-            results.claim(PARTS)
-            run.simulate(results.path, follow)
+            parts = results.claim(PARTS)
+            try:
+                run.simulate(results.path, follow)
+            except BaseException:
+                if not parts.exists():  # nothing was simulated
+                    results.discard()
+                raise
         if follow.acts:  # what was done by hand stands in the scenario now
             _write_inputs(run, results)
         run.write(results)

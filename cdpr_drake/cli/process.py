@@ -29,9 +29,6 @@ INTERRUPTED = 130
 INCOMPLETE = 3
 """Exit code where the data is complete and something that is made of it is missing."""
 
-CLIENT_ENDED = 4
-"""Exit code of a run that ended early because of the process outside that closes its loop."""
-
 STUDY_FAILED = 5
 """Exit code of a reproduction of which a study failed; the report says which."""
 

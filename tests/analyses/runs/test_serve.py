@@ -15,7 +15,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.cli.process import CLIENT_ENDED, INTERRUPTED
+from cdpr_drake.cli.process import INTERRUPTED
+from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.systems.remote.remote_client import RemoteClient
 from tests.cli.commands import ended, refuse
 from tests.cli.conftest import only
@@ -73,7 +74,6 @@ def test_a_client_without_the_package(capsys, tmp_path):
     assert not (tmp_path / "again").exists()
 
 
-@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("ending", ["nonsense", "signal"])
 def test_what_was_simulated_is_written(capsys, tmp_path, ending):
     port, out = free_port(), tmp_path / "out"
@@ -96,7 +96,8 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
 
     thread = threading.Thread(target=drive)
     thread.start()
-    code = ended("serve", *SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
+    with only("nothing"):
+        code = ended("serve", *SCENARIO, "--port", str(port), "--out", str(out), "--duration", "3")
     thread.join()
     err = printed(capsys).err
     summary = json.loads((out / "summary.json").read_text())
@@ -107,7 +108,7 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
         assert summary["outcome"] == "interrupted"
         assert ends == ["interrupted"]
         return
-    assert code == CLIENT_ENDED
+    assert code == ClientEndedError.exit_code
     assert summary["outcome"] == "client_ended"
     assert summary["sim_time_s"] == pytest.approx(0.1)
     (line,) = [line for line in err.splitlines() if line.startswith("cdpr:")]
@@ -121,7 +122,7 @@ def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
         "serve", *SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out)
     )
     err = printed(capsys).err
-    assert code == CLIENT_ENDED
+    assert code == ClientEndedError.exit_code
     assert "open to other machines" in err
     assert err.splitlines()[-1] == "cdpr: no client came within 0 s; nothing was simulated"
     assert not out.exists()

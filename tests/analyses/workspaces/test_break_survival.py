@@ -1,4 +1,4 @@
-"""A cable breaks: one break under several reactions, and single breaks from a pose in a batch."""
+"""Single breaks of cables from a pose, in a batch, against runs of the scenario in a diagram."""
 
 from dataclasses import replace
 
@@ -8,7 +8,6 @@ from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.runs.breaks import BRAKE, REDISTRIBUTE, STOP
-from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.workspaces import break_survival
 from cdpr_drake.analyses.workspaces.break_survival import (
     CALM,
@@ -16,57 +15,10 @@ from cdpr_drake.analyses.workspaces.break_survival import (
     BreakRequest,
     breaks_at,
 )
-from cdpr_drake.errors import ScenarioError, StoppedError, WorkspaceError
+from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
-
-# One break of a cable under several reactions: what a call compares, shows and refuses.
-
-SHORT = ("integration.engine=compiled",)
-CABLE, TIME, AFTER = 5, 0.3, 0.3
-
-
-@pytest.fixture(scope="module")
-def compared():
-    return cdpr.compare_reactions(
-        cable=CABLE, time=TIME, after=AFTER, reactions=("none", "stop"), overrides=SHORT
-    )
-
-
-def test_it_is_what_runs_of_the_scenario_say(compared):
-    scenario = load_scenario("acrobot_broken_redistributed", [
-        *SHORT, f"failures.events=[{{kind: cable_breaks, time: {TIME}, cable: {CABLE}}}]",
-        "emergency={reaction: stop, delay: 0.03}", f"duration={TIME + AFTER}", "log_rate=500",
-    ])  # fmt: skip
-    log = ServoRun(scenario).simulate().log
-    since = log["time"] > TIME - 1e-3
-    way = np.linalg.norm(log["X_WP"][since, 4:] - log["X_WP"][since][0, 4:], axis=1)
-    assert compared.rows["stop"]["excursion_m"] == pytest.approx(way.max(), rel=1e-9)
-    assert compared.rows["stop"]["tension_n"] == np.max(log["tensions"][since])
-    assert compared.rows["none"]["excursion_m"] != compared.rows["stop"]["excursion_m"]
-
-
-def test_it_shows_itself(compared):
-    assert compared.cable == "C6"
-    assert "none" in repr(compared)
-    assert compared.as_dict()["reactions"].keys() == {"none", "stop"}
-    assert compared.columns()["reaction"] == ["none", "stop"]
-    left, right = compared.plot().axes
-    assert left.get_xlabel() == "largest excursion [mm]"
-    assert [bar.get_width() for bar in right.patches] == [
-        row["largest_speed_m_s"] for row in compared.rows.values()
-    ]
-
-
-def test_it_stops_when_it_is_asked_to():
-    with pytest.raises(StoppedError, match="after 0 of 1 reactions"):
-        cdpr.compare_reactions(
-            reactions=("none",), overrides=SHORT, session=cdpr.Session(should_stop=lambda: True)
-        )
-
-
-# Single breaks from a pose, in a batch, beside runs of the scenario in a diagram.
 
 SCENARIO = "acrobot_broken_redistributed"
 POSITION = np.array([0.05, 0.02, 0.35])
@@ -164,21 +116,11 @@ def test_a_pose_that_is_not_held_has_no_answer():
     assert breaks_at(load_robot("acrobot_large"), high, request()) is None
 
 
-def compare(**asked):
-    return lambda: cdpr.compare_reactions(**asked)
-
-
 def check(**changes):
     return lambda: request(**changes).check(load_robot("acrobot_large"))
 
 
 REFUSALS = [
-    (compare(reactions=("pray",)), "reactions: found 'pray'; accepted: none, stop, redistribute"),
-    (compare(reactions=()), "reactions: found none"),
-    (compare(cable=8), "cable: found 8; accepted: 0 to 7"),
-    (compare(time=0.0), "time: found 0; accepted: a number > 0"),
-    (compare(after=np.nan), "after: found nan"),
-    (compare(scenario="planar_computed_torque"), "found kind .*; accepted: a visual servo"),
     (check(reactions=("pray",)), "reactions 'pray' is unknown"),
     (check(reactions=()), "reactions: found none"),
     (check(after=CALM), "after: found 0.1"),
@@ -190,6 +132,5 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("call", "words"), REFUSALS)
 def test_what_is_refused(call, words):
-    error = ScenarioError if "compare" in call.__qualname__ else WorkspaceError
-    with pytest.raises(error, match=words):
+    with pytest.raises(WorkspaceError, match=words):
         call()
