@@ -17,7 +17,8 @@ from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS, Formats, OutFolder, words
-from cdpr_drake.analyses.runs.log import PARTS, DiskLog, Log, finite
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.runs.log import PARTS, DiskLog, Log
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import Stability, stability_along, stability_figure
 from cdpr_drake.errors import CdprError, OutputFolderError

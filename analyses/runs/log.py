@@ -296,12 +296,3 @@ def spread(values: Array) -> dict[str, float | None]:
     if len(values) == 0:
         return {"max": None, "mean": None}
     return {"max": float(np.max(values)), "mean": float(np.mean(values))}
-
-
-def finite(value: Any) -> Any:
-    """A summary in which numbers that are not finite, as a diverged run leaves, are None."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

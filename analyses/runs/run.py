@@ -22,6 +22,7 @@ from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import (
     code_version,
     package_versions,
@@ -35,7 +36,6 @@ from cdpr_drake.analyses.runs.log import (
     Log,
     Recorder,
     column_names,
-    finite,
     log_block,
     write_log,
 )
@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 
 PIECE = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
+
 
 @dataclass(frozen=True)
 class Section:

@@ -42,8 +42,8 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
-from cdpr_drake.analyses.runs.log import finite
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.simulate import Camera, scenario_with
 from cdpr_drake.arrays import Array
