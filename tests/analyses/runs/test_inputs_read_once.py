@@ -100,7 +100,7 @@ def test_platform_meshes_are_those_that_were_read(tmp_path):
 
 
 def test_results_have_the_hash_of_what_was_read(tmp_path, monkeypatch):
-    monkeypatch.setattr("cdpr_drake.analyses.front.simulation.write_pictures", lambda *_: {})
+    monkeypatch.setattr("cdpr_drake.analyses.runs.run.figure_writers", lambda *_: {})
     file = write_robot(tmp_path / "mine.yaml")
     wanted = hashlib.sha256(file.read_bytes()).hexdigest()
     cdpr.simulate("acrobot_pbvs", [*SHORT, f"robot={file}"], folder=tmp_path / "run")

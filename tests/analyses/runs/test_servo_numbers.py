@@ -1,6 +1,5 @@
 """Summary and curves of a run against what its log, written by hand, says on paper."""
 
-from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
@@ -8,10 +7,10 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs.servo import drift
-from cdpr_drake.analyses.simulation.run_traces import estimate_jump
+from cdpr_drake.analyses.studies.servo import estimate_jump
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from tests.analyses.simulation.run_by_hand import (
+from tests.analyses.runs.run_by_hand import (
     ESTIMATE_OFF,
     ESTIMATE_TURNED,
     FOUND,
@@ -19,6 +18,7 @@ from tests.analyses.simulation.run_by_hand import (
     PLAN_TURNED,
     SEEN,
     TIMES,
+    changed,
     platform_poses,
     run_by_hand,
     with_plan,
@@ -77,13 +77,13 @@ def test_the_image_path_is_where_the_target_was_seen(hand):
 
 def test_the_desired_point_need_not_be_the_middle_of_the_image():
     shifted = run_by_hand("acrobot_pbvs", "desired.position=[0.01, -0.02, 0.09]")
-    pinhole = shifted.servo.pinhole
+    pinhole = shifted.built.pinhole
     expected = [319.5 + pinhole.fx * 0.01 / 0.09, 239.5 - pinhole.fy * 0.02 / 0.09]
     np.testing.assert_allclose(shifted.image_path[2][1], expected, atol=BY_HAND)
 
 
 def test_a_run_that_never_saw_its_target_has_no_image_path(hand):
-    blind = replace(hand, log=hand.log | {"found": np.zeros((4, 1))})
+    blind = changed(hand, log=hand.log | {"found": np.zeros((4, 1))})
     times, path, line = blind.image_path
     assert len(times) == 0
     assert path.shape == (0, 2)
@@ -106,7 +106,7 @@ def test_the_image_and_deviations_in_it_also_as_if_it_had_1600_pixels(summary, t
 
 
 def test_the_camera_path_runs_from_its_first_sample_to_the_desired_pose(hand, summary, traces):
-    servo, (places, goal, away) = hand.servo, in_space(hand.servo)
+    servo, (places, goal, away) = hand.built, in_space(hand.built)
     for track, line in (
         (hand.camera_path, hand.camera_line),
         (traces["camera_path"], traces["camera_line"]),
@@ -124,7 +124,7 @@ def test_the_camera_path_runs_from_its_first_sample_to_the_desired_pose(hand, su
 def test_a_camera_in_the_world_is_seen_from_its_target():
     """The target moves with the platform, so the path of the camera is in the target's frame."""
     hand = run_by_hand("acrobot_eye_to_hand")
-    servo = hand.servo
+    servo = hand.built
     track, line = (hand.camera_path, hand.camera_line)
     X_WC = servo.mounting.X_WC(platform_poses()[0])
     X_PO = servo.scenario.target.pose.transform()
@@ -155,7 +155,7 @@ def test_errors_of_estimate_and_plan(hand, summary):
 
 
 def test_final_errors_are_of_the_last_pose_and_the_desired_one(hand, summary):
-    servo = hand.servo
+    servo = hand.built
     X_CO = (platform_poses()[-1] @ servo.X_PC).inverse() @ servo.X_WO
     between = servo.X_CdO.inverse() @ X_CO
     distance = np.linalg.norm(X_CO.translation() - servo.X_CdO.translation())
@@ -167,7 +167,7 @@ def test_final_errors_are_of_the_last_pose_and_the_desired_one(hand, summary):
 def test_final_errors_are_from_where_a_moving_target_is_at_the_end():
     """It sets out from (-0.06, -0.18, 0) m at 20 mm/s along y."""
     moving = run_by_hand("acrobot_moving_tag")
-    servo = moving.servo
+    servo = moving.built
     p_WO = np.array([-0.06, -0.18 + 0.02 * TIMES[-1], 0.0])
     p_CO = (platform_poses()[-1] @ servo.X_PC).inverse() @ p_WO
     distance = np.linalg.norm(p_CO - servo.X_CdO.translation())
@@ -195,22 +195,22 @@ def test_words_and_numbers_of_the_run(hand, summary):
         "realtime_factor": 7.0,
         "tension_n": {"min": 0.0, "max": 57.5},
         "broken_cables": None,
-        "integration_step_s": hand.servo.max_step,
+        "integration_step_s": hand.built.max_step,
     }
     assert {key: summary[key] for key in expected} == expected
     assert summary["versions"]["drake"] == version("drake")
 
 
 def test_a_run_that_took_no_time_has_no_real_time_factor(hand):
-    assert replace(hand, wall_time=0.0).as_dict()["realtime_factor"] is None
-    assert replace(hand, wall_time=1.0).as_dict()["realtime_factor"] == 3.5
+    assert changed(hand, wall_time=0.0).as_dict()["realtime_factor"] is None
+    assert changed(hand, wall_time=1.0).as_dict()["realtime_factor"] == 3.5
 
 
 def test_broken_cables_are_named_with_their_times(hand):
     times = np.array([-1.0, 0.0, -1.0, 2.25, -1.0, -1.0, -1.0, -1.0])
-    found = replace(hand, broken=times).as_dict()["broken_cables"]
+    found = changed(hand, broken=times).as_dict()["broken_cables"]
     assert found == [{"cable": "C2", "time_s": 0.0}, {"cable": "C4", "time_s": 2.25}]
-    assert replace(hand, broken=np.full(8, -1.0)).as_dict()["broken_cables"] == []
+    assert changed(hand, broken=np.full(8, -1.0)).as_dict()["broken_cables"] == []
 
 
 def test_a_moving_target_has_no_line_and_a_plan_has_a_name():
@@ -225,7 +225,7 @@ def test_a_diverged_run_has_no_numbers_and_no_warnings(hand):
     rows = np.array([pose_row(X) for X in far])
     tensions = hand.log["tensions"].copy()
     tensions[3] = np.nan
-    lost = replace(
+    lost = changed(
         hand, outcome=Outcome.DIVERGED, log=hand.log | {"X_WP": rows, "tensions": tensions}
     )
     found = lost.as_dict()
@@ -269,12 +269,12 @@ def test_the_jump_is_of_the_error_and_not_of_the_path(hand, traces):
     two = {key: traces[key][2:] for key in ("platform_path", "estimate_path")}
     assert estimate_jump(two) == pytest.approx(0.001, abs=BY_HAND)
     rows = np.array([pose_row(X) for X in platform_poses()])
-    exact = replace(hand, log=hand.log | {"X_WP_estimated": rows}).traces()
+    exact = changed(hand, log=hand.log | {"X_WP_estimated": rows}).traces()
     assert estimate_jump(exact) == 0.0
 
 
 def test_corners_are_kept_where_the_object_was_seen(hand, traces):
-    pinhole, servo = hand.servo.pinhole, hand.servo
+    pinhole, servo = hand.built.pinhole, hand.built
     assert traces["corner_paths"].shape == (3, 4, 2)
     seen = hand.log[f"{servo.target.mark}_px"][FOUND].reshape(-1, 4, 2)
     np.testing.assert_allclose(traces["corner_paths"], WIDE * seen, atol=SINGLE_PRECISION)

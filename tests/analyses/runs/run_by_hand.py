@@ -1,15 +1,14 @@
 """A run whose log is written by hand, so that what is made of it can be worked out on paper."""
 
-from dataclasses import replace
-
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+
+ENDING = ("outcome", "message", "sim_time", "wall_time")
 
 TIMES = np.array([0.0, 0.5, 1.5, 3.5])
 """Of the rows; no two are equally far apart [s]."""
@@ -24,8 +23,8 @@ ESTIMATE_OFF = np.array([0.001, 0.004, 0.002, 0.003])
 ESTIMATE_TURNED = np.array([0.01, 0.02, 0.05, 0.04])
 """Angle of the estimate from the truth [rad]."""
 
-PLAN_OFF, PLAN_TURNED = np.array([0.01, 0.03]), np.array([0.2, 0.1])
-"""The same of the plan [m], [rad], which ends earlier than the run."""
+PLAN_OFF, PLAN_TURNED = np.array([0.01, 0.03, 0.02, 0.02]), np.array([0.2, 0.1, 0.15, 0.15])
+"""The same of the plan [m], [rad]."""
 
 
 def platform_poses():
@@ -44,8 +43,9 @@ def off(X_WP, distance, angle):
 
 
 def run_by_hand(name="acrobot_pbvs", *settings):
-    """A result with that log for a scenario that is built and not run."""
-    servo = build_visual_servo(load_scenario(name, ["camera.kind=projected", *settings]))
+    """A run with that log of a scenario that is built and not simulated."""
+    run = ServoRun(load_scenario(name, ["camera.kind=projected", *settings]))
+    servo = run.built
     m, pinhole = len(servo.robot.cables), servo.pinhole
     poses = platform_poses()
     depth = np.array([0.5, 0.4, 0.3, 0.2])
@@ -79,13 +79,22 @@ def run_by_hand(name="acrobot_pbvs", *settings):
         "surplus_lengths": 0.01 * slack,
         "cable_velocities": rng.uniform(-0.1, 0.1, (4, m)),
     }
-    return ServoRun(
-        servo=servo, log=log, outcome=Outcome.TIMEOUT, message="slow", sim_time=3.5, wall_time=0.5
+    return changed(
+        run, log=log, outcome=Outcome.TIMEOUT, message="slow", sim_time=3.5, wall_time=0.5
     )
 
 
+def changed(run, **attributes):
+    """A run of the same scenario with other attributes, and nothing that was computed of it."""
+    same = {name: getattr(run, name) for name in (*ENDING, "built", "log", "broken")}
+    other = ServoRun(run.scenario)
+    for name, value in {**same, **attributes}.items():
+        setattr(other, name, value)
+    return other
+
+
 def with_plan(result):
-    """The same with a plan for the first two rows."""
-    poses = zip(platform_poses(), PLAN_OFF, PLAN_TURNED, strict=False)
+    """The same with a plan."""
+    poses = zip(platform_poses(), PLAN_OFF, PLAN_TURNED, strict=True)
     planned = np.array([pose_row(off(*each)) for each in poses])
-    return replace(result, log=result.log | {"X_WP_planned": planned})
+    return changed(result, log=result.log | {"X_WP_planned": planned})
