@@ -41,6 +41,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from cdpr_drake.analyses.reporting.log_on_disk import PARTS
+
 from tests.left_files import Reference, broken_files, unknown_files
 
 SIGNALS = {"SIGTERM": signal.SIGTERM, "SIGINT": signal.SIGINT, "SIGKILL": signal.SIGKILL}

@@ -45,7 +45,7 @@ from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import Camera, scenario_with
+from cdpr_drake.analyses.runs.simulate import Camera, check, scenario_with
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.pose_accuracy import repeatability
@@ -507,10 +507,7 @@ def repeat_run(
         raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
     loaded, note = set_loop(loaded, True)
     run = ServoRun(loaded)
-    follow.doing(f"{loaded.name}: building the diagram")
-    for line in [*(f"warning: {warning}" for warning in run.check()), note]:
-        if line:
-            follow.say(line)
+    check(run, note, follow)
     arguments = run.arguments()
     del arguments["scenario"]["seed"]
     below = None if follow.results is None else follow.results.parent / "runs"

@@ -103,6 +103,14 @@ class TorqueSteps:
         }
 
 
+SECTIONS = (
+    subjects.MOTORS, subjects.WANTED_TENSIONS, subjects.BEHAVIOUR, *SENSING,
+    subjects.TENSION_GAIN, subjects.DISTURBANCES, subjects.FAILURES, subjects.WRENCH,
+    LEARNT_POINTS, PAN_TILT, subjects.WORLD, STABILITY,
+)  # fmt: skip
+"""Subjects of runs of visual servos, in the order of their numbers in a summary."""
+
+
 class ServoRun(Run):
     """A run of a visual servo.
 
@@ -118,11 +126,7 @@ class ServoRun(Run):
     """
 
     kind = VISUAL_SERVO
-    sections = (
-        subjects.MOTORS, subjects.WANTED_TENSIONS, subjects.BEHAVIOUR, *SENSING,
-        subjects.TENSION_GAIN, subjects.DISTURBANCES, subjects.FAILURES, subjects.WRENCH,
-        LEARNT_POINTS, PAN_TILT, subjects.WORLD, STABILITY,
-    )  # fmt: skip
+    sections = SECTIONS
     broken = step_errors = depth_image = None
     images: tuple[int, int] | None = None
     torque: TorqueSteps | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -44,6 +45,8 @@ from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import MECHANISM, TENSION_CONTROL, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
+
+_LOG = logging.getLogger(__name__)
 
 KINDS: dict[str, type[Run]] = {
     run.kind: run for run in (ServoRun, TensionRun, PickAndPlaceRun, MechanismRun)
@@ -112,11 +115,7 @@ def simulate(
         follow = replace(follow, prepare=_in_meshcat(run, host or LOCAL, port, follow))
     elif steered_by is not None:
         follow = steered(follow, loaded, steered_by)
-    follow.doing(f"{loaded.name}: building the diagram")
-    warnings = run.check()
-    for line in [note, *(f"warning: {warning}" for warning in warnings)]:
-        if line:
-            follow.say(line)
+    check(run, note, follow)
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
     with results_folder(base, arguments, folder, overwrite, follow.results) as results:
         if results is None:
@@ -173,6 +172,21 @@ def finish_run(
         if not run.stopped:
             run.settle(results)
     return run
+
+
+def check(run: Run, note: str, follow: Follow) -> None:
+    """Builds a run, and says a note and warnings; Python prints them on stderr if nobody follows.
+
+    Raises:
+        CdprError: It cannot be built.
+    """
+    follow.doing(f"{run.scenario.name}: building the diagram")
+    warnings = run.check()
+    if follow is NOBODY:
+        for warning in warnings:
+            _LOG.warning("%s", warning)
+    for line in [*filter(None, [note]), *(f"warning: {warning}" for warning in warnings)]:
+        follow.say(line)
 
 
 def scenario_with(

@@ -4,11 +4,11 @@ import gc
 
 import numpy as np
 import pytest
+from cdpr_drake.analyses.reporting.log_on_disk import LogOnDisk, log_block
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cdpr_drake.analyses.reporting.log_files import write_log
-from cdpr_drake.analyses.reporting.log_on_disk import LogOnDisk, log_block
 from cdpr_drake.errors import OutputFolderError
 
 

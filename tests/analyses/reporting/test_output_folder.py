@@ -7,11 +7,11 @@ import os
 from pathlib import Path
 
 import pytest
+from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 
 from cdpr_drake.analyses.reporting import output_folder
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
-from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.analyses.reporting.output_folder import (
     continued_folder,
     results_folder,

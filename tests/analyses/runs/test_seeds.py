@@ -34,7 +34,7 @@ from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
-from tests.analyses.simulation.test_inputs_read_once import write_robot
+from tests.analyses.runs.test_inputs_read_once import write_robot
 from tests.cli.commands import killed_after, refuse, run
 from tests.figure_faults import figure_faults
 

@@ -367,6 +367,20 @@ def test_two_writers_foreign_and_changed_files_are_refused_and_nothing_is_remove
     assert (here / "out" / "scenario.yaml").read_text() == "name: mine"
 
 
+def test_warnings_go_to_the_log_if_nobody_follows_and_else_to_who_does(caplog):
+    unseen = ["camera.kind=projected", "desired.position=[1.0, 0.0, 0.3]"]
+    cdpr.simulate("planar_pbvs", unseen, duration=0.05)
+    told = [each.getMessage() for each in caplog.records if each.levelname == "WARNING"]
+    assert ["does not see" in told[0], "outside the frame" in told[1], len(told)] == [True, True, 2]
+    caplog.clear()
+    lines = []
+    cdpr.simulate("planar_pbvs", unseen, duration=0.05, follow=Follow(say=lines.append))
+    assert [line for line in lines if line.startswith("warning: ")] == [
+        f"warning: {words}" for words in told
+    ]
+    assert caplog.records == []
+
+
 def test_ctrl_c_in_python_ends_the_run_with_what_it_has(monkeypatch):
     def interrupt(now):
         if now.done > 0.15:
