@@ -137,13 +137,10 @@ GROUPS = (DEFAULT, COMPILED, *QUESTIONS, BROKEN)
 ROBOTS = Path(__file__).parents[1] / "models" / "robots"
 """A folder for each robot and mechanism that comes with the package."""
 
-SIMULATIONS = ("simulate", "serve", "studio")
+SIMULATIONS = ("simulate", "serve", "reactions", "studio")
 
 PROGRESS = "progress: "
 """How a line of progress begins where there is no terminal, and no other line on stderr does."""
-
-QUIET = ("--help", "--finish")
-"""Words with which nothing is computed."""
 
 _expected = 0
 
@@ -180,7 +177,7 @@ def expected_kernels() -> int:
 
 def _groups(command: str, words: Sequence[str]) -> list[str]:
     """Groups of the kernels that a command line needs."""
-    if any(word in QUIET for word in words):
+    if "--help" in words:
         return []
     if command == "workspace":
         return _groups_of_kinds(words)
