@@ -258,7 +258,7 @@ class MechanismRun(Run):
 
     def replay(self, path: Path) -> None:
         limits = self.built.limits
-        write_mechanism_replay(path, self.robot, self.log, limits=limits, title=self.scenario.title)
+        write_mechanism_replay(path, self.robot, self.log, limits=limits, title=self.heading)
 
 
 @dataclass(frozen=True)

@@ -262,7 +262,7 @@ class PickAndPlaceRun(Run):
     def replay(self, path: Path) -> None:
         scenario = self.scenario
         write_replay(
-            path, self.robot, self.log, cables=scenario.cables, title=scenario.title,
+            path, self.robot, self.log, cables=scenario.cables, title=self.heading,
             around=Surroundings(scenario.world, tuple(shown_things(scenario))),
         )  # fmt: skip
 

@@ -47,10 +47,12 @@ from cdpr_drake.errors import (
     OutputFolderError,
     ScenarioError,
 )
-from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.mechanism_files import mechanism_names
+from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.schema.input_files import input_bytes
 from cdpr_drake.schema.yaml_files import plain_values
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.scenarios.files import scenario_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -353,9 +355,16 @@ class Run(Result):
                 drawn |= {name: partial(draw, self) for name, draw in section.figures.items()}
         return drawn
 
+    @cached_property
+    def heading(self) -> str:
+        """Title of the scenario; empty if that is of the package and the robot is a user's."""
+        shipped = self.robot.name in (*robot_names(), *mechanism_names())
+        return self.scenario.title if shipped or self.scenario.name not in scenario_names() else ""
+
     def title(self, words: str) -> str:
         """Title of a figure: what it shows, and below what the run was."""
-        lines = words, self.scenario.title, f"({self.scenario.name}, {self.subtitle()})"
+        name = self.scenario.name if self.heading else f"{self.robot.name}, {self.scenario.name}"
+        lines = words, self.heading, f"({name}, {self.subtitle()})"
         return "\n".join(line for line in lines if line)
 
     def columns(self) -> dict[str, Array]:

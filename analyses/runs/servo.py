@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -411,7 +411,8 @@ class ServoRun(Run):
         film = path.parent / drawn.FILM
         view = drawn.camera_view(self, film if film.is_file() else None)
         camera = (self.built.mounting, self.built.pinhole)
-        write_replay(path, self.robot, self.log, self.scenario, camera=camera, view=view)
+        scenario = replace(self.scenario, title=self.heading)
+        write_replay(path, self.robot, self.log, scenario, camera=camera, view=view)
 
     def traces(self) -> dict[str, Array]:
         """Arrays that figures of many runs draw, in pixels of an image `THESIS_WIDTH` wide and SI

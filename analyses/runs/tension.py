@@ -257,7 +257,7 @@ class TensionRun(Run):
     def replay(self, path: Path) -> None:
         cables = CableSettings(model=ELASTIC, pulleys=self.scenario.cables.pulleys)
         write_replay(
-            path, self.robot, self.log, cables=cables, title=self.scenario.title,
+            path, self.robot, self.log, cables=cables, title=self.heading,
             around=Surroundings(self.scenario.world),
             limits=self.robot.tension_limits(self.scenario.limits()),
         )  # fmt: skip

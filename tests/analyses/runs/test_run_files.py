@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.servo_figures import FILM, write_film
 from cdpr_drake.analyses.visualization.replay import write_replay
+from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 SHORT = ("camera.kind=projected", "integration.engine=compiled")
@@ -132,6 +134,20 @@ def test_other_schemes_leave_the_same_files_with_their_own_columns(name, expecte
     columns = (tmp_path / "log.csv").read_text().partition("\n")[0].split(",")
     assert set(expected) <= set(columns)
     assert len(set(columns)) == len(columns)
+
+
+def test_a_users_robot_is_named_in_the_place_of_the_scenarios_title(run, tmp_path):
+    """Figures of one's own robot once said ACROBOT."""
+    assert "ACROBOT approaches" in run[1].plot("tensions").get_suptitle()
+    text = robot_file("acrobot_small").read_text()
+    (tmp_path / "hall.yaml").write_text(text.replace("name: acrobot_small", "name: hall"))
+    scenario = load_scenario("acrobot_pbvs", [f"robot={tmp_path / 'hall.yaml'}"])
+    mine = ServoRun(scenario)
+    mine.log = run[1].log
+    words = "Tensions of the cables\n(hall, acrobot_pbvs, pulleys ignored, rendered camera, seed 0)"
+    assert mine.plot("tensions").get_suptitle() == words
+    own = ServoRun(replace(scenario, name="approach", title="HALL approaches a tag"))
+    assert own.title("Paths").startswith("Paths\nHALL approaches a tag\n(approach, ")
 
 
 def test_a_figure_that_fails_is_named_and_the_others_are_there(run, tmp_path, monkeypatch):
