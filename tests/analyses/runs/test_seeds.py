@@ -89,6 +89,9 @@ def test_who_runs_them_and_edits_of_the_robot_meanwhile_change_nothing(workers, 
 def test_seeds_make_runs_differ(runs):
     ends = np.array([record.end for record in runs.records])
     assert np.min(np.ptp(ends[:, 4:], axis=0)) > 1e-6
+    # They are in the frame of the desired pose.
+    distances = np.linalg.norm(ends[:, 4:], axis=1)
+    assert distances == pytest.approx(runs.values("final_position_error_m"), rel=1e-9)
     estimates = runs.values("final_pose_estimate_error_m")
     assert np.all(estimates > 0.03)
     assert len(set(estimates)) == 3
