@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import Folder, read_marker, results_folder
+from cdpr_drake.analyses.frame.folder import Folder, free_folder, read_marker, results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -117,6 +117,8 @@ def simulate(
         follow = steered(follow, loaded, steered_by)
     check(run, note, follow)
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
+    if follow.connect is not None and folder is None and follow.results is not None:
+        folder = free_folder(follow.results.parent / base, {})  # no such run goes on
     with results_folder(base, arguments, folder, overwrite, follow.results) as results:
         if results is None:
             return run.simulate(None, follow)

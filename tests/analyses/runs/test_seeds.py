@@ -29,8 +29,9 @@ from cdpr_drake.analyses.runs.seeds import (
     statistics,
     with_seeds,
 )
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import InfeasibleTensionError, OutputFolderError, OutputFormatError
-from cdpr_drake.geometry.poses import pose_from_angles, pose_row
+from cdpr_drake.geometry.poses import pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
@@ -86,12 +87,15 @@ def test_who_runs_them_and_edits_of_the_robot_meanwhile_change_nothing(workers, 
     assert heavy.summary["tension_n"] != runs.records[0].summary["tension_n"]
 
 
-def test_seeds_make_runs_differ(runs):
+def test_seeds_make_runs_differ_and_ends_are_in_the_frame_of_the_desired_pose(runs):
     ends = np.array([record.end for record in runs.records])
     assert np.min(np.ptp(ends[:, 4:], axis=0)) > 1e-6
     estimates = runs.values("final_pose_estimate_error_m")
     assert np.all(estimates > 0.03)
     assert len(set(estimates)) == 3
+    run = ServoRun(runs.scenarios[0]).simulate()
+    end = run.built.desired_platform_pose() @ pose_from_row(ends[0])
+    assert end.IsNearlyEqualTo(pose_from_row(run.log["X_WP"][-1]), 1e-12)
 
 
 def test_a_request_to_stop_keeps_what_is_finished(scenario):
