@@ -75,7 +75,7 @@ REFUSED = {
         ("--workers 2", "--workers: found without --seeds; accepted: with"),
         ("acrobot_computed_torque --seeds 0:2", "--seeds: found with a tension_control"),
         ("--seeds 0:2 --set initial_pose.position=[0,0,1.1]", "cannot hold"),
-        (f"{QUICK} --seeds 1 --workers 1 --out . --set integration.loop=diagram",
+        (f"{QUICK} --seeds 1 --workers 1 --out . --set integration.engine=plant",
          "found the working folder, one above it"),
     ],
     "finish": [
