@@ -270,8 +270,6 @@ def _distribute() -> None:
 
 
 def _simulate(name: str, *overrides: str) -> None:
-    from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-    from cdpr_drake.systems.diagrams.load import load_scenario
+    from cdpr_drake.analyses.runs.simulate import simulate
 
-    scenario = load_scenario(name, [*overrides, f"duration={PIECE}"])
-    SCENARIO_KINDS[scenario.kind].run(scenario)
+    simulate(name, overrides, duration=PIECE)

@@ -8,7 +8,6 @@ from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
-from .analyses.front.failures import compare_reactions as compare_reactions
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
@@ -16,9 +15,6 @@ from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
-from .analyses.front.simulation import continue_run as continue_run
-from .analyses.front.simulation import finish_run as finish_run
-from .analyses.front.simulation import simulate as simulate
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics
@@ -26,7 +22,16 @@ from .analyses.logs.log_request import LogRequest as LogRequest
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
-from .analyses.simulation.stability_files import assess_run as assess_run
+from .analyses.runs.along import assess_run as assess_run
+from .analyses.runs.reactions import compare_reactions as compare_reactions
+from .analyses.runs.run import Run as Run
+from .analyses.runs.seeds import repeat_run as repeat_run
+from .analyses.runs.seeds import run_many as run_many
+from .analyses.runs.serve import serve as serve
+from .analyses.runs.servo import ServoRun as ServoRun
+from .analyses.runs.simulate import finish_run as finish_run
+from .analyses.runs.simulate import simulate as simulate
+from .analyses.runs.tension import TensionRun as TensionRun
 from .analyses.statics.static import solve_static as solve_static
 from .analyses.studies.report import reproduce as reproduce
 from .analyses.studies.study import Case as Case

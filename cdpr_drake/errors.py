@@ -253,7 +253,13 @@ class BridgeError(CdprError):
 
 
 class ClientEndedError(CdprError):
-    """The process outside that closes a run's loop is gone, silent, or makes no sense any more."""
+    """The process outside that closes a run's loop is gone, silent, or makes no sense any more.
+
+    Attributes:
+        exit_code: Of a command that ends with it.
+    """
+
+    exit_code = 4
 
 
 class IdentificationError(CdprError):

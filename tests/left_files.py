@@ -11,8 +11,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from cdpr_drake.analyses.frame.folder import foreign_files, read_marker
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS
 from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
+from cdpr_drake.analyses.runs.log import PARTS
 
 TOLD = re.compile(
     r"/(by_earlier_sessions|note|taken_over|seconds|wall_time_s|microseconds|processor time [^/]*)$"

@@ -40,7 +40,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
-from cdpr_drake.analyses.reporting.log_on_disk import PARTS
+from cdpr_drake.analyses.runs.log import PARTS
 from tests.left_files import Reference, broken_files, unknown_files
 
 SIGNALS = {"SIGTERM": signal.SIGTERM, "SIGINT": signal.SIGINT, "SIGKILL": signal.SIGKILL}
@@ -447,18 +447,14 @@ class Campaign:
 
     def _check_log(self) -> Iterator[str]:
         """A run that was ended has the beginning of the log of the one that was not."""
-        left = [p for p in self._folder.glob(".out-work-*") if (p / PARTS / "layout.json").exists()]
-        left += [p for p in self._folder.glob("out-*") if (p / PARTS / "layout.json").exists()]
-        if left:
-            words = [sys.executable, "-P", "-m", "cdpr_drake", "simulate", "--finish", "out"]
-            if not left[0].name.startswith("."):
-                words[-1] = left[0].name
+        if (self._folder / "out" / PARTS / "layout.json").exists():
+            words = [sys.executable, "-P", "-m", "cdpr_drake", "finish", "out"]
             done = subprocess.run(
                 words, cwd=self._folder, capture_output=True, text=True,
                 env={**os.environ, "PYTHONPATH": str(ROOT)},
             )  # fmt: skip
             if done.returncode not in (0, 2) or "Traceback" in done.stderr:
-                yield f"--finish: exit code {done.returncode}: {done.stderr[-300:]!r}"
+                yield f"finish: exit code {done.returncode}: {done.stderr[-300:]!r}"
         whole = (self._reference.folder / "log.csv").read_text()
         for log in self._folder.glob("out*/log.csv"):
             rows = log.read_text().splitlines()

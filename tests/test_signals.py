@@ -7,9 +7,7 @@ import sys
 
 import pytest
 
-from cdpr_drake.analyses.reporting.log_files import write_whole
-from cdpr_drake.analyses.reporting.output_folder import continued_folder
-from cdpr_drake.analyses.reporting.written_files import mark
+from cdpr_drake.analyses.frame.folder import Folder
 from tests import signals
 from tests.left_files import Reference, broken_files, unknown_files
 from tests.signals import COMMANDS, ROOT
@@ -68,10 +66,8 @@ def test_a_file_that_is_not_whole_is_seen(tmp_path, name):
 
 def test_a_file_that_no_list_has_is_seen(tmp_path):
     out = tmp_path / "out"
-    with continued_folder(out):
-        out.mkdir()
-        mark(out)
-        write_whole(out / "a.csv", "x\n1\n")
+    with Folder(out, {}) as results:
+        results.write_text("a.csv", "x\n1\n")
         (out / "b.csv").write_text("x\n1\n")  # by who forgot to say so
     assert [words.split(" ")[0] for words in unknown_files(tmp_path)] == ["out/b.csv"]
 

@@ -21,8 +21,7 @@ from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask,
 from cdpr_drake.analyses.calibration.calibration_task import Calibration, calibrate
 from cdpr_drake.analyses.calibration.candidate_poses import in_short_hops, rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.simulation.run_summary import camera_path
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measured_program import first_readings
@@ -231,8 +230,8 @@ def servo_again(
         "true": exact,
     }.items():
         say(f"Servoing, {name}")
-        run = run_scenario(scenario)
-        path, line = camera_path(run)
+        run = ServoRun(scenario).simulate()
+        path, line = run.camera_path, run.camera_line
         found[name] = {
             "outcome": run.outcome.name.lower(),
             "time_s": run.sim_time,

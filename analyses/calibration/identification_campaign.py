@@ -27,7 +27,7 @@ from cdpr_drake.analyses.calibration.identified_robots import (
     platform_size,
 )
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.reporting.log_on_disk import Log
+from cdpr_drake.analyses.runs.log import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import (

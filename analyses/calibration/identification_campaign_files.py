@@ -18,9 +18,10 @@ from cdpr_drake.analyses.calibration.identification_report import identification
 from cdpr_drake.analyses.calibration.log_fit import ROBOT, LogFit
 from cdpr_drake.analyses.frame.figures import bars, new_figure
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
-from cdpr_drake.analyses.reporting.log_files import column_names, write_scenario, write_whole
+from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
 from cdpr_drake.analyses.reporting.tables import new_table
+from cdpr_drake.analyses.runs.log import column_names
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.systems.scenarios.tension_control_scenario import Stretch, TensionScenario
@@ -43,7 +44,7 @@ def write_dynamic_campaign(campaign: DynamicCampaign, folder: Path) -> LogFit:
     names = [cable.name for cable in campaign.true.cables]
     for name, log in campaign.logs.items():
         table = np.column_stack(list(log.values()))
-        columns = dict(zip(column_names(log, names), table.T, strict=True))
+        columns = dict(zip(column_names(log, {"cables": names}), table.T, strict=True))
         write_columns(folder / f"{name}.csv", columns)
     write_scenario(folder / "scenario.yaml", excitation_scenario(campaign))
     tracking: Callable[[], Figure] = partial(_tracking_figure, campaign)

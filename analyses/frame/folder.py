@@ -173,6 +173,25 @@ class Folder:
             finally:
                 part.unlink(missing_ok=True)
 
+    @contextmanager
+    def files(self) -> Iterator[Path]:
+        """A folder whose files get into this one, each whole, when the block ends.
+
+        Raises:
+            OutputFolderError: They cannot be written, for instance on a full disk.
+        """
+        stage = self.path / f"{PART}files"
+        with self.writing():
+            shutil.rmtree(stage, ignore_errors=True)
+            stage.mkdir()
+            try:
+                yield stage
+                for path in sorted(stage.iterdir()):
+                    _sync(path)
+                    path.replace(self.claim(path.name))
+            finally:
+                shutil.rmtree(stage, ignore_errors=True)
+
     def write_text(self, name: str, words: str) -> None:
         """Writes a text file."""
         with self.file(name) as part:
@@ -209,6 +228,13 @@ class Folder:
             except Exception as problem:  # whatever a figure stumbles over
                 failed[name] = (str(problem) or type(problem).__name__).splitlines()[0][:300]
         return failed
+
+    def discard(self) -> None:
+        """Removes what was written: nothing was computed."""
+        for name in self._files:
+            if (self.path / name).exists():
+                _remove(self.path / name)
+        self._files = []
 
     def complete(self) -> None:
         """Marks the results as complete, and writes hashes of the files of users that were read."""

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from cdpr_drake.errors import StoppedError
 
@@ -46,12 +47,20 @@ class Follow:
         stop: Asked often; True ends the work after the pieces under way, and what is done is kept.
         say: Gets a line on what happens.
         results: Folder below which results are kept that nobody gave a folder; None: none are.
+        prepare: Gets a run, Drake's simulator and the diagram before the run starts.
+        acts: True if what was prepared may change the run, which then cannot go on after a kill.
+        connect: Brings a process outside to its place in the loop of a run, a `Remote`.
+        ended: Gets a run when it has ended, before its files are written.
     """
 
     progress: Callable[[Progress], None] = lambda progress: None
     stop: Callable[[], bool] = lambda: False
     say: Callable[[str], None] = lambda words: None
     results: Path | None = None
+    prepare: Callable[[Any, Any, Any], None] | None = None
+    acts: bool = False
+    connect: Callable[[Any], None] | None = None
+    ended: Callable[[Any], None] = lambda run: None
 
     def doing(self, words: str) -> None:
         """Tells what is done now, of work of which nobody knows how long it takes.

@@ -45,6 +45,29 @@ def extreme_rows(values: Array, bins: int = BINS) -> np.ndarray:
     return np.array(sorted(rows))
 
 
+def envelope(values: Array, pieces: int = 250) -> tuple[np.ndarray, Array, Array, Array] | None:
+    """Extremes and means of pieces of a curve that chatters: it turns back twice in most of them.
+
+    Args:
+        values: Shape (n,).
+        pieces: Number of pieces; 250 of a figure's width are as wide as a thick line.
+
+    Returns:
+        The middle row of each piece, and its lowest, mean and highest value, shape (pieces,); None
+        for a smoother curve, one with less than four rows for each piece, or with gaps.
+    """
+    count = len(values)
+    if count < 4 * pieces or not np.all(np.isfinite(values)):
+        return None
+    edges = np.linspace(0, count, pieces + 1).astype(int)
+    turns = np.append([False, False], np.diff(np.sign(np.diff(values))) != 0)
+    if np.median(np.add.reduceat(turns, edges[:-1])) < 2:
+        return None
+    low, high = (extreme.reduceat(values, edges[:-1]) for extreme in (np.minimum, np.maximum))
+    means = np.add.reduceat(values, edges[:-1]) / np.diff(edges)
+    return (edges[:-1] + edges[1:]) // 2, low, means, high
+
+
 def path_rows(points: Array, bins: int = BINS) -> np.ndarray:
     """Rows of a path, shape (n, d), that show all of it: the extremes of each coordinate."""
     return np.unique(np.concatenate([extreme_rows(column, bins) for column in points.T]))

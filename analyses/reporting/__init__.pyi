@@ -3,7 +3,5 @@ from .exported_logs import LOG_WRITERS as LOG_WRITERS
 from .log_files import finite as finite
 from .log_files import write_json as write_json
 from .log_files import write_whole as write_whole
-from .output_folder import continued_folder as continued_folder
 from .output_folder import results_folder as results_folder
-from .output_folder import resumed_folder as resumed_folder
 from .written_files import whole_file as whole_file

@@ -71,11 +71,6 @@ def drawing(folder: Path, should_stop: Callable[[], bool] | None = None) -> Iter
         (folder / DRAWING).unlink()
 
 
-def is_undrawn(folder: Path) -> bool:
-    """Whether a folder has the data of a run that ended while its pictures were drawn."""
-    return (folder / DRAWING).is_file()
-
-
 MOST_NEW = 2_000_000
 """Objects that one picture may make before garbage is searched for while it is drawn."""
 

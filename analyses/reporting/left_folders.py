@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.analyses.reporting.written_files import (
     MARKER,
     WORK,
@@ -33,11 +32,6 @@ class KeptFiles(NamedTuple):
 
     names: list[str]
     folder: Path
-
-
-def holds_log(folder: Path) -> bool:
-    """Whether a folder has the log of a run that was not finished."""
-    return (folder / PARTS / LAYOUT).is_file()
 
 
 def sibling_folder(final: Path, what: str = "before") -> Path:
@@ -81,9 +75,8 @@ def clear_hidden(final: Path) -> tuple[list[Path], list[KeptFiles]]:
     recovered, kept = [], []
     for stale in hidden_folders(final):
         finished = any((stale / name).is_file() for name in FINISHED)
-        if finished or holds_log(stale):
-            ending = "recovered" if finished else "unfinished"
-            shown = free_folder(final.with_name(f"{final.name}-{ending}"))
+        if finished:
+            shown = free_folder(final.with_name(f"{final.name}-recovered"))
             stale.chmod(0o755)
             if BEFORE not in stale.name.removeprefix(f".{final.name}"):
                 list_all(stale)

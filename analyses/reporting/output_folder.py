@@ -18,8 +18,6 @@ from cdpr_drake.analyses.reporting.left_folders import (
     RESULTS,
     KeptFiles,
     clear_hidden,
-    hidden_folders,
-    holds_log,
     remove_older,
     sibling_folder,
 )
@@ -54,10 +52,7 @@ class ResultsFolder:
 
     Attributes:
         path: Where to write now: a hidden folder until `publish`, then the final one.
-        recovered: Where results of killed runs were put that nobody had seen yet: finished, or a
-            log that can be made into results, see `holds_log`.
-        unfinished: Whether what is written is not all that was asked for; older results, which it
-            would replace, are kept beside it then, as NAME-before.
+        recovered: Where finished results of killed commands were put that nobody had seen yet.
         kept: What of older results was not this program's, once they are replaced.
         redone: Whether older results are those that ended while their pictures were drawn.
     """
@@ -66,7 +61,7 @@ class ResultsFolder:
         self, work: Path, final: Path, recovered: list[Path], files: WritingFolder
     ) -> None:
         """With the hidden folder and the final one, and the list of the former's files."""
-        self.path, self.recovered, self.unfinished = work, recovered, False
+        self.path, self.recovered = work, recovered
         self.kept: list[KeptFiles] = []
         self.redone = False
         self._final, self._files = final, files
@@ -104,7 +99,7 @@ class ResultsFolder:
             self.path.rename(self._final)
             self._files.shown_as(self._final)
             other = self.redone and before is not None and not _same_asked(before, self._final)
-            if before is not None and (self.unfinished or other):
+            if before is not None and other:
                 _rename_own(before, sibling_folder(self._final))
             elif before is not None:
                 self.replace(before)
@@ -126,10 +121,6 @@ class ResultsFolder:
     def replace(self, before: Path) -> None:
         """Removes older results; what among them is not this program's is kept, and named."""
         self.kept += remove_older(before, self._final)
-
-    def keep_log(self) -> Path:
-        """Gives a folder with the log of a run that was not finished a name that can be seen."""
-        return self._keep("unfinished")
 
     def _keep(self, what: str = "results") -> Path:
         """Gives results that cannot have their own name another one that can be seen."""
@@ -221,13 +212,8 @@ def results_folder(
 
 
 def _say_left(problem: BaseException, results: ResultsFolder) -> None:
-    """Notes where what was finished or simulated is, and removes what is neither."""
-    if not results.published and holds_log(results.path):
-        problem.add_note(
-            f"what was simulated is in {results.keep_log()}; finish_run makes log, summary and "
-            "figures of that folder, continue_run goes on"
-        )
-    elif not results.published and (results.path / RESULTS).is_file():
+    """Notes where what was finished is, and removes what is not."""
+    if not results.published and (results.path / RESULTS).is_file():
         problem.add_note(f"what was finished is in {results.publish()}")
     elif not results.published:
         shutil.rmtree(results.path, ignore_errors=True)
@@ -243,86 +229,6 @@ def _name_folder(problem: OSError, results: ResultsFolder) -> None:
     elif problem.filename and Path(str(problem.filename)).is_relative_to(results.path):
         inside = Path(str(problem.filename)).relative_to(results.path)
         problem.filename = str(results.final / inside)
-
-
-@contextmanager
-def resumed_folder(folder: Path) -> Iterator[ResultsFolder]:
-    """A folder in the making that a program left whose run had not ended, to go on with.
-
-    It gets its name when its data is finished, as in `results_folder`; a log that bears a name of
-    its own already, as NAME-unfinished does, stays there. After an error all stays as it is.
-
-    Args:
-        folder: Where that log is, or where the run was to write its results.
-
-    Raises:
-        OutputFolderError: There is no such log, or the run is still going on.
-    """
-    with _left(folder) as final:
-        work = next((path for path in (final, *hidden_folders(final)) if holds_log(path)), None)
-        if work is None:
-            raise _no_log(folder)
-        with writing(work, hidden=work != final) as files:
-            results = ResultsFolder(work, final, [], files)
-            yield results
-            results.publish()
-
-
-@contextmanager
-def continued_folder(folder: Path, overwrite: bool = False) -> Iterator[ResultsFolder]:
-    """A folder to work in from the start, so that what is in it outlives whatever ends the program.
-
-    Whether what is there may be continued is for `SweepFolder` to say, which makes the folder, too.
-    With `overwrite`, older results of this program are put aside, and removed when the block ends
-    without an error, with all that was asked for; otherwise they are kept beside, as NAME-before.
-
-    Args:
-        folder: Where the results shall be.
-        overwrite: Whether what is there is to be replaced.
-
-    Raises:
-        OutputFolderError: As `results_folder`.
-    """
-    final = _checked(folder)
-    if overwrite and final.is_dir():
-        _check_replaceable(final)
-    made = [parent for parent in final.parents if not parent.exists()]
-    try:
-        final.parent.mkdir(parents=True, exist_ok=True)
-        with locked(final):
-            before = None
-            if overwrite and final.is_dir():
-                before = _rename_own(final, sibling_folder(final))
-            with writing(final) as files:
-                results = ResultsFolder(final, final, [], files)
-                try:
-                    yield results
-                except BaseException as problem:
-                    _say_kept(problem, final, before)
-                    raise
-                _tell_inputs(final)
-                if before is not None and not results.unfinished:
-                    results.replace(before)
-    except OSError as problem:
-        if problem.filename and not Path(str(problem.filename)).is_relative_to(final.parent):
-            raise  # it is about another file
-        raise OutputFolderError(
-            f"{final}: cannot be written: {problem.strerror or problem}"
-        ) from problem
-    finally:
-        _remove_empty(made)
-
-
-def _say_kept(problem: BaseException, final: Path, before: Path | None) -> None:
-    """Notes where what was finished is when it is not written to the end."""
-    noted = getattr(problem, "__notes__", ())  # by what works in a folder inside this one
-    if isinstance(problem, KeyboardInterrupt) and not noted and final.is_dir():
-        problem.add_note(f"what was finished is kept in {final}; the same command continues")
-    if before is not None:
-        if not final.exists():  # nothing has come in their place
-            before.rename(final)
-        else:
-            problem.add_note(f"older results are in {before}")
 
 
 def _checked(folder: Path) -> Path:
@@ -352,53 +258,6 @@ def _check_replaceable(final: Path) -> None:
             f"{final}: holds files that cdpr did not write, which are never replaced; name "
             "another folder"
         )
-
-
-@contextmanager
-def unfinished_folder(folder: Path) -> Iterator[Path]:
-    """A folder with the log of a run that was not finished, for nobody else inside the block.
-
-    Args:
-        folder: Where that log is, or where the run was to write its results.
-
-    Raises:
-        OutputFolderError: There is no such log, or the run is still going on.
-    """
-    with _left(folder) as final:
-        if not holds_log(final):
-            for kept in clear_hidden(final)[0]:
-                if holds_log(kept):
-                    final = kept
-                    break
-            else:
-                raise _no_log(folder)
-        with writing(final):
-            yield final
-
-
-@contextmanager
-def finished_folder(folder: Path) -> Iterator[Path]:
-    """A folder of finished data to which pictures are added, for nobody else inside the block.
-
-    Raises:
-        OutputFolderError: It is not there, or is written just now.
-    """
-    with _left(folder) as final, writing(final):
-        yield final
-
-
-@contextmanager
-def _left(folder: Path) -> Iterator[Path]:
-    """Where a run was to write its results, as `_checked`, for nobody else inside the block."""
-    final = _checked(folder)
-    if not final.parent.is_dir():
-        raise OutputFolderError(f"{folder}: not there")
-    with locked(final):
-        yield final
-
-
-def _no_log(folder: Path) -> OutputFolderError:
-    return OutputFolderError(f"{folder}: holds no log of a run that was not finished")
 
 
 def _remove_empty(folders: list[Path]) -> None:

@@ -24,8 +24,7 @@ from cdpr_drake.analyses.calibration.calibration_task import calibrate
 from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
-from cdpr_drake.analyses.simulation.run_summary import camera_path
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
 from cdpr_drake.arrays import Array
@@ -336,7 +335,7 @@ def straightness(trial: CameraTrial) -> dict[str, float]:
     for name, model in models.items():
         scenario = load_scenario(SCENARIO, CHANGES)
         if model is None:
-            run = run_scenario(scenario)
+            run = ServoRun(scenario).simulate()
         else:
             X_WP = scenario.initial_pose.transform()
             program = CalibrationProgram(model, [X_WP], ())
@@ -351,8 +350,8 @@ def straightness(trial: CameraTrial) -> dict[str, float]:
                     position=np.array(X.translation()),
                     angles_deg=np.degrees(angles_from_rotation(X.rotation())),
                 )
-                run = run_scenario(scenario)
-        path_W, line = camera_path(run)
+                run = ServoRun(scenario).simulate()
+        path_W, line = run.camera_path, run.camera_line
         distances[name] = float(np.max(distances_from_line(path_W, *line)))
     return distances
 

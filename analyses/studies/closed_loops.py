@@ -22,7 +22,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.perturbed_servo import (
     Perturbation,
     PerturbedServo,
@@ -179,7 +179,7 @@ def kinematic_path(servo: PerturbedServo, X_WP: RigidTransform) -> KinematicPath
     return KinematicPath(poses, np.array(errors), outcome)
 
 
-def seen_errors(result: RunResult) -> Array:
+def seen_errors(result: ServoRun) -> Array:
     """|e| of the features at the control steps at which the target was seen, shape (n,)."""
     errors = np.linalg.norm(result.log["error"], axis=1)
     # The servo's first output comes after its first image; a lost target leaves the last error.
@@ -235,7 +235,7 @@ def closed_loop(scheme: str, mode: str, start_pose: Sequence[float]) -> dict[str
         made = perturbed_scenario(scenario, X_WP, perturbation)
         made.estimator.kind = loop
         made.sensors.tracker = "ideal"
-        result = run_scenario(choose_compiled_loop(made))
+        result = ServoRun(choose_compiled_loop(made)).simulate()
         rows, believed = result.log["X_WP"], result.log["X_WP_estimated"]
         outcome, errors, time = Outcome(result.outcome), seen_errors(result), result.sim_time
         taut = int(np.sum(result.log["slack"][-1] == 0.0))

@@ -25,8 +25,8 @@ from cdpr_drake.analyses.frame.figures import (
     plain_numbers,
     styled,
 )
-from cdpr_drake.analyses.simulation.tension_control_run import TensionRun, run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -64,10 +64,10 @@ def run_pair(name: str, overrides: Sequence[str]) -> dict[str, Any]:
     """
     tensions = scenario_kind(name) == TENSION_CONTROL
     more = [] if tensions else ["camera.kind=projected"]
-    runs: list[RunResult | TensionRun] = []
+    runs: list[ServoRun | TensionRun] = []
     for engine in (PLANT, COMPILED):
         scenario = load_scenario(name, [*more, *overrides, f"integration.engine={engine}"])
-        runs.append((run_tension_scenario if tensions else run_scenario)(scenario))
+        runs.append((TensionRun if tensions else ServoRun)(scenario).simulate())
     one, other = runs
     count = min(len(run.log["time"]) for run in runs)
     distance, angle = pose_rows_distance(one.log["X_WP"][:count], other.log["X_WP"][:count])
@@ -87,13 +87,13 @@ def run_pair(name: str, overrides: Sequence[str]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def final_error(run: RunResult | TensionRun) -> float:
+def final_error(run: ServoRun | TensionRun) -> float:
     """Distance of the last logged pose from where it should be [m]."""
     log = run.log
     if isinstance(run, TensionRun):
         distance, _ = pose_rows_distance(log["X_WP"][-1:], log["X_WP_desired"][-1:])
         return float(distance[0])
-    desired = run.servo.desired_platform_pose(float(log["time"][-1]))
+    desired = run.built.desired_platform_pose(float(log["time"][-1]))
     return float(np.linalg.norm(desired.translation() - log["X_WP"][-1, 4:]))
 
 

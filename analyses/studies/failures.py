@@ -3,7 +3,7 @@
 ACROBOT with its large platform moves under a visual servo by motor torques.
 
 In the study `failure` one cable breaks at a time: every single cable, at several poses and speeds,
-and every reaction of `simulation.break_report`. If nobody knows, the controller goes on to ask the
+and every reaction of `runs.breaks`. If nobody knows, the controller goes on to ask the
 broken cable for its part, and to its goal, so that its way counts as excursion, too. The robot
 hangs: all exit points are above. At most poses seven of its cables hold it only if some of them may
 go slack, or not at all; column `holds` says whether tensions from zero to the upper limit balance
@@ -39,7 +39,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
-from cdpr_drake.analyses.simulation.break_report import (
+from cdpr_drake.analyses.runs.breaks import (
     BRAKE,
     NONE,
     REACTIONS,
@@ -47,7 +47,7 @@ from cdpr_drake.analyses.simulation.break_report import (
     STOP,
     after_break,
 )
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.break_detection import detectable_tension
@@ -106,7 +106,7 @@ def break_row(shift: int, time: float, cable: int, reaction: str) -> dict[str, A
         f"emergency={REACTIONS[reaction]}", f"duration={time + BREAK_AFTER:g}",
         f"log_rate={RATE:g}", "integration.engine=compiled",
     ])  # fmt: skip
-    run, robot = run_scenario(scenario), load_robot(scenario.robot)
+    run, robot = ServoRun(scenario).simulate(), load_robot(scenario.robot)
     numbers = after_break(run.log, robot, cable, time, scenario.cables.pulleys)
     return {"outcome": Outcome(run.outcome).name.lower(), **numbers}
 
@@ -300,7 +300,7 @@ def alarm_row(fails: str, which: int, number: int) -> dict[str, Any]:
         tension_n: the smallest reading before.
     """
     scenario = load_scenario(SCENARIO, alarm_changes(fails, which, number))
-    run = run_scenario(scenario)
+    run = ServoRun(scenario).simulate()
     log, times = run.log, run.log["time"]
     begins = np.inf if fails == NOTHING else fail_time(which, number)
     before = times < begins - 0.5 / RATE

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.experiments import wrong_points
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
@@ -177,8 +177,8 @@ def servo_row(changes: Sequence[str], duration: float, seed: int) -> dict[str, A
         distance of the estimate from the truth, of the target in the camera from where it should
         be, normalized error squared [-].
     """
-    result = run_scenario(servo_scenario(changes, duration, seed))
-    log, servo = result.log, result.servo
+    result = ServoRun(servo_scenario(changes, duration, seed)).simulate()
+    log, servo = result.log, result.built
     times, count = log["time"], round(duration * RATE) + 1
     distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
     target = np.array([
@@ -263,7 +263,7 @@ def slack_row(way: str, surplus: float, seed: int) -> dict[str, Any]:
     """
     slack = [surplus if k in CABLES else 0.0 for k in range(8)]
     changes = [f"seed={seed}", f"perturbations.slack={slack}", f"tension_management={WAYS[way]}"]
-    result = run_scenario(load_scenario(SLACK_SCENARIO, [*SLACK_CHANGES, *changes]))
+    result = ServoRun(load_scenario(SLACK_SCENARIO, [*SLACK_CHANGES, *changes])).simulate()
     log = result.log
     rows = np.flatnonzero(np.any(log["surplus_lengths"][:, CABLES] > TAUT, axis=1))
     apart = np.linalg.norm(log["X_WP"][:, 4:] - log["X_WP_estimated"][:, 4:], axis=1)
@@ -279,10 +279,10 @@ def slack_row(way: str, surplus: float, seed: int) -> dict[str, Any]:
     }
 
 
-def image_errors(result: RunResult, seed: int) -> Array:
+def image_errors(result: ServoRun, seed: int) -> Array:
     """Errors of the slack that the robot's camera in the world sees in the rows of a log, for
     cables that are slack, shape (n,) [m]; NaN if it does not see it."""
-    log, servo = result.log, result.servo
+    log, servo = result.log, result.built
     robot, cables = servo.robot, servo.believed.cables.without_pulleys()
     mount = robot.camera_mount("overview")
     lens = load_camera(mount.model)

@@ -25,7 +25,7 @@ from cdpr_drake.analyses.frame.figures import (
     plain_numbers,
 )
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.rows import Row
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
@@ -212,7 +212,7 @@ def follow(changes: Sequence[str], laps: int, friction: float, seed: int) -> Row
         assert scenario.target.motion.mobile_robot is not None
         lap_time = scenario.target.motion.mobile_robot.lap_time
         scenario.duration, scenario.log_rate = laps * lap_time, LOG_RATE
-        result = run_scenario(choose_compiled_loop(scenario))
+        result = ServoRun(choose_compiled_loop(scenario)).simulate()
     done, failed = result.sim_time / lap_time, bool(result.outcome != Outcome.TIMEOUT)
     under = times_beyond(result.log["time"], slack_cables(result) > FREE)
     curves = lap_curves(result, laps, lap_time)
@@ -234,12 +234,12 @@ def with_friction(factor: float) -> Robot:
     return robot
 
 
-def slack_cables(result: RunResult) -> Array:
+def slack_cables(result: ServoRun) -> Array:
     """Numbers of slack cables in the rows of the log, shape (n,)."""
     return np.asarray(np.sum(result.log["tensions"] < SLACK, axis=1))
 
 
-def lap_curves(result: RunResult, laps: int, lap_time: float) -> dict[str, Array]:
+def lap_curves(result: ServoRun, laps: int, lap_time: float) -> dict[str, Array]:
     """Numbers of each lap, and quantities at moments of laps; NaN beyond the end of the run.
 
     Args:

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select, summary
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import exponential, pose_from_angles, pose_from_row, pose_row
@@ -151,8 +151,8 @@ def free_row(scheme: str, seed: int) -> dict[str, Any]:
 
 def robot_row(scheme: str, seed: int) -> dict[str, Any]:
     """A drawn start of ACROBOT, see `FreeCamera.run`; without depths and dots."""
-    run = run_scenario(load_scenario(SCENARIO, robot_changes(scheme, seed)))
-    log, servo = run.log, run.servo
+    run = ServoRun(load_scenario(SCENARIO, robot_changes(scheme, seed))).simulate()
+    log, servo = run.log, run.built
     poses = [
         servo.X_CO(pose_from_row(row), time)
         for row, time in zip(log["X_WP"], log["time"], strict=True)

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.simulation.run_stability import stability_along
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.run_traces import estimate_jump, run_traces
-from cdpr_drake.analyses.simulation.visual_servo_run import RunResult, run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.stability import stability_along
 from cdpr_drake.analyses.studies.facts import FACTORS, MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, unit_of
 from cdpr_drake.arrays import Array
@@ -148,8 +146,8 @@ def servo_run(
     Returns:
         outcome, message; `METRICS` and the study's own, None where there is none; summary, as
         `cdpr simulate` writes it; features, names of the components of "error"; stop_position_m,
-        the measured distance at which a run counts as converged; the arrays of `run_traces`, and
-        of `stability_curves`.
+        the measured distance at which a run counts as converged; the arrays of
+        `ServoRun.traces`, and of `stability_curves`.
     """
     items = [*changes, f"seed={seed}"]
     loaded = load_scenario(scenario, items)
@@ -160,11 +158,11 @@ def servo_run(
         robot.platform = replace(robot.platform, **arrays)
     with robot_reference(robot) as name:
         loaded = load_scenario(scenario, [*items, f"robot={name}"])
-        result = run_scenario(choose_compiled_loop(loaded))
-    curves = run_traces(result)
+        result = ServoRun(choose_compiled_loop(loaded)).simulate()
+    curves = result.traces()
     if stability is not None:
         curves |= stability_curves(result, stability)
-    summary = summarize(result)
+    summary = result.as_dict()
     image, camera = summary["image_deviation_px_1600x1200"], summary["camera_deviation_m"]
     return {
         "outcome": summary["outcome"], "message": result.message,
@@ -177,13 +175,21 @@ def servo_run(
         "estimate_jump_m": estimate_jump(curves),
         **({} if metrics is None else metrics(curves)),
         "summary": {name: value for name, value in summary.items() if name not in LEFT_OUT},
-        "features": list(result.servo.feature_names),
-        "stop_position_m": result.servo.scenario.stop.position,
+        "features": list(result.built.feature_names),
+        "stop_position_m": result.built.scenario.stop.position,
         **curves,
     }  # fmt: skip
 
 
-def stability_curves(result: RunResult, threshold: float) -> dict[str, Array]:
+def estimate_jump(curves: Curves) -> float:
+    """Largest change of the estimate's error vector between two rows of the log [m]."""
+    error = curves["estimate_path"] - curves["platform_path"]
+    if len(error) < 2:
+        return 0.0
+    return float(np.max(np.linalg.norm(np.diff(error, axis=0), axis=1)))
+
+
+def stability_curves(result: ServoRun, threshold: float) -> dict[str, Array]:
     """The criterion along a run, cables below a tension `threshold` [N] left out.
 
     Returns:

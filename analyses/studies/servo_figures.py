@@ -27,7 +27,7 @@ from cdpr_drake.analyses.frame.figures import (
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
-from cdpr_drake.analyses.simulation.stability_files import draw_steps
+from cdpr_drake.analyses.runs.stability import draw_steps
 from cdpr_drake.analyses.studies.study import Frame
 from cdpr_drake.analyses.visualization.path_figures import set_box
 from cdpr_drake.arrays import Array

@@ -11,19 +11,24 @@ from matplotlib.figure import Figure
 from cdpr_drake.analyses.frame.figures import (
     LEGEND_BESIDE,
     bare_figure,
-    curves,
     draw_bars,
+    draw_curve,
     line_style,
+    phase_of,
     shade,
     styled,
 )
-from cdpr_drake.analyses.frame.thinning import by_pieces
+from cdpr_drake.analyses.frame.thinning import by_pieces, envelope
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import BOUND, nth_look
 
 NEAR = 1.5
 """Bounds up to so many times the largest tension are drawn; a farther one would press the curves
 flat, and is put into words."""
+
+
+BAND_ALPHA = 0.35
+"""Of the band in which values chatter."""
 
 
 class HasCables(Protocol):
@@ -78,8 +83,20 @@ def cable_figure(
 def draw_cables(
     axes: Any, robot: HasCables, times: Array, values: Array, scale: float = 1.0
 ) -> None:
-    """Draws a curve for each cable in its own look; values of shape (n, m)."""
-    curves(axes, times, values, [cable.name for cable in robot.cables], scale=scale)
+    """Draws a curve for each cable in its own look; values of shape (n, m).
+
+    A cable whose values chatter has a curve of their means, in a pale band between their extremes.
+    """
+    count = len(robot.cables)
+    for k, cable in enumerate(robot.cables):
+        look, phase, chatter = nth_look(k), phase_of(k, count), envelope(values[:, k])
+        if chatter is None:
+            draw_curve(axes, times, values[:, k], look, cable.name, scale=scale, phase=phase)
+            continue
+        rows, low, means, high = chatter
+        band = {"color": look.color, "alpha": BAND_ALPHA, "linewidth": 0.0}
+        axes.fill_between(times[rows], scale * low, scale * high, **band)
+        draw_curve(axes, times[rows], means, look, cable.name, scale=scale, phase=phase)
 
 
 def _draw_bounds(axes: Any, bounds: tuple[float, float], words: str) -> None:

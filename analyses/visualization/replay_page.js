@@ -60,7 +60,7 @@
     themed.push(() => { square.style.background = paint(); });
   }
   if (data.scale > 0) {
-    add(bar, "div", "", "cable tension [N]");
+    add(bar, "div", "", "cables by tension [N]");
     const step = data.scale / data.colors.length;
     for (let k = data.colors.length - 1; k >= 0; k--) {
       const words = number.format(k * step) + " to " + number.format((k + 1) * step);
@@ -75,9 +75,7 @@
   choice.parentElement.append(" names of the cables");
   const names = data.names.map((name, k) => {
     const made = add(pane, "div", "cdpr-name", name);
-    if (data.scale === 0) {  // else they have the colours of their cables, by tension
-      themed.push(() => { made.style.borderBottomColor = color(data.looks[k]); });
-    }
+    themed.push(() => { made.style.borderBottomColor = color(data.looks[k]); });
     return made;
   });
   function times(m, v) {  // a column-major matrix of three.js on a vector of four
@@ -298,7 +296,7 @@
           if (data.scale > 0) {
             const level = Math.min(Math.floor(data.colors.length * value / data.scale),
               data.colors.length - 1);
-            names[k].style.borderBottomColor = hangs ? data.slack : data.colors[level] || "";
+            c.value.style.borderRightColor = hangs ? data.slack : data.colors[level] || "";
           }
         }),
       };

@@ -38,7 +38,7 @@ from cdpr_drake.workspaces.wrench_capacity import (
 )
 
 if TYPE_CHECKING:
-    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
+    from cdpr_drake.analyses.workspaces.break_survival import BreakRequest
     from cdpr_drake.analyses.workspaces.servo_stability import ServoStability
 
 SURVIVES, EXCURSION, WORST, BEST = (
@@ -97,7 +97,7 @@ class SimulatedBreaks:
         number of that cable, from 1; `BEST`, number of that reaction in the request, from 1.
         The last three are NaN where all cables do not hold the pose.
         """
-        from cdpr_drake.analyses.simulation.break_survival import breaks_at  # few need it
+        from cdpr_drake.analyses.workspaces.break_survival import breaks_at  # few need it
 
         table = np.full((stop - start, 3), np.nan)
         survives = np.zeros(stop - start, bool)

@@ -198,8 +198,8 @@ def _simulated_breaks(
     robot: Robot, grid: WorkspaceGrid, scenario: Any, reactions: Sequence[str] | None,
     moving: Array | Sequence[float] | None, after: float, limits: tuple[float, float] | None,
 ) -> SimulatedBreaks:  # fmt: skip
-    from cdpr_drake.analyses.simulation.break_report import DEFAULT_SAVING
-    from cdpr_drake.analyses.simulation.break_survival import BreakRequest
+    from cdpr_drake.analyses.runs.breaks import DEFAULT_SAVING
+    from cdpr_drake.analyses.workspaces.break_survival import BreakRequest
 
     request = BreakRequest(
         scenario=visual_servo(scenario or BREAKING, f"the kind {SURVIVES}"),

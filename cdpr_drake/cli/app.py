@@ -21,8 +21,13 @@ from cdpr_drake.blas_threads import (
     started_with_one_thread,
 )
 from cdpr_drake.cli.commands import COMMANDS, FIRST_STEPS
-from cdpr_drake.cli.process import INTERRUPTED, SIGNALS, compile_ahead, exit_with_parent
-from cdpr_drake.errors import CdprError, StoppedError, plain_words
+from cdpr_drake.cli.process import (
+    INTERRUPTED,
+    SIGNALS,
+    compile_ahead,
+    exit_with_parent,
+)
+from cdpr_drake.errors import CdprError, ClientEndedError, StoppedError, plain_words
 from cdpr_drake.kernel_cache.locks import share_compilation
 from cdpr_drake.version import __version__
 
@@ -205,9 +210,9 @@ def _problems_in_words() -> Iterator[None]:
     except OSError as problem:  # such as a full disk, or a folder that vanished
         where = f"{problem.filename}: " if problem.filename else ""
         _refuse(f"{where}{problem.strerror or problem}{_notes(problem)}")
-    except StoppedError as problem:
+    except (StoppedError, ClientEndedError) as problem:
         print(f"cdpr: {plain_words(str(problem))}", file=sys.stderr)
-        sys.exit(INTERRUPTED)
+        sys.exit(INTERRUPTED if isinstance(problem, StoppedError) else problem.exit_code)
     except CdprError as problem:
         _refuse(f"{problem}{_notes(problem)}")
     except KeyboardInterrupt as problem:

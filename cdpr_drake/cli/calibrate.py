@@ -122,7 +122,7 @@ def calibrate(
                accepted=("out", *output, *of_campaign))  # fmt: skip
         scenario = load_scenario(campaign)
         folder = results_below_runs(out, f"campaign-{scenario.name}")
-        session = fit_session(folder)
+        session = fit_session()
         with named_options({"scenario": "--campaign"}):
             simulated = calibrate_in_simulation(
                 scenario, poses_from or poses, folder=folder, session=session, **output
@@ -132,7 +132,7 @@ def calibrate(
     name, file = robot_and_log("calibrate", robot, log)
     loaded = load_robot(name, "cdpr calibrate")
     folder = results_below_runs(out, f"calibrate-{loaded.name}")
-    session = fit_session(folder)
+    session = fit_session()
     calibration = run_calibration(
         loaded, file, unknown, sigmas=sigmas or {}, tags=tags, tag_size=tag_size,
         tracker_late=tracker_late, folder=folder, session=session, priors=priors or {},

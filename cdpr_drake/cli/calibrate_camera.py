@@ -62,7 +62,7 @@ def calibrate_camera(
     if not 0.0 < rate <= 1e5:
         raise CdprError(f"rate: found {rate:g}; accepted: above 0 and at most 100000 [Hz]")
     folder = results_below_runs(out, f"camera-{name}")
-    session = fit_session(folder)
+    session = fit_session()
     columns, rows = squares
     camera = run_calibration(
         images, CalibrationBoard(board, columns, rows, size, marker, markers), model, folder=folder,

@@ -42,14 +42,28 @@ _RUN, _FILES, _ANALYSE, _PLAN, _MACHINES, _STUDIES, _TOOLS = (
 
 COMMANDS = {
     "simulate": Command(
-        _RUN, f"{_CLI}.simulate:simulate",
+        _RUN, f"{_VERBS}.runs.simulate:simulate",
         "Simulates a scenario and writes summary, log, figures and replay.",
         ("cdpr simulate", "cdpr simulate caroca_ibvs --camera projected --seeds 0:20"),
+        {"seeds": (
+            f"{_VERBS}.runs.seeds:repeat_run",
+            "Repeats a visual servo over seeds, and writes statistics, a table and a figure.",
+        )},
+    ),
+    "finish": Command(
+        _RUN, f"{_VERBS}.runs.simulate:finish_run",
+        "Writes log, summary and figures of a run that was interrupted, without going on.",
+        ("cdpr finish runs/acrobot_pbvs", "cdpr finish runs/acrobot_pbvs --video"),
     ),
     "serve": Command(
-        _RUN, f"{_CLI}.serve:serve",
+        _RUN, f"{_VERBS}.runs.serve:serve",
         "Runs a scenario with an external process in its loop, over ZeroMQ.",
         ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
+    ),
+    "reactions": Command(
+        _RUN, f"{_VERBS}.runs.reactions:compare_reactions",
+        "Breaks a cable of a visual servo by motor torques, once for each reaction.",
+        ("cdpr reactions", "cdpr reactions --cable 3 --reactions stop,brake --camera projected"),
     ),
     "environments": Command(
         _RUN, f"{_VERBS}.environments:list_environments",
@@ -130,7 +144,7 @@ COMMANDS = {
         "Finds where a visual servo is stable (Z), the platform can be held (S), and both (SZ).",
         ("cdpr stability acrobot_large", "cdpr stability acrobot_large --scheme pbvs --json"),
         {"along": (
-            f"{_VERBS}.simulation.stability_files:assess_run",
+            f"{_VERBS}.runs.along:assess_run",
             "Judges the stability of a visual servo along a run, with slack cables left out.",
         )},
     ),

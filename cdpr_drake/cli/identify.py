@@ -122,7 +122,7 @@ def identify(
                accepted=("campaign", "unknown", "out", *output))  # fmt: skip
         scenario = load_scenario(campaign)
         folder = results_below_runs(out, f"identify-{scenario.name}")
-        session = fit_session(folder)
+        session = fit_session()
         with named_options({"scenario": "--campaign"}):
             simulated = identify_in_simulation(
                 scenario, CAMPAIGN_UNKNOWN if unknown is None else unknown, folder=folder,
@@ -132,7 +132,7 @@ def identify(
     name, file = robot_and_log("identify", robot, log)
     loaded = load_robot(name, "cdpr identify")
     folder = results_below_runs(out, f"identify-{loaded.name}")
-    session = fit_session(folder)
+    session = fit_session()
     of_swing = ("hold_out", "start", "lead", "sigmas", "tracker_frame")
     if free is not None:
         refuse(identify, values, "with --free; accepted: without it",

@@ -14,8 +14,6 @@ COMMAND_WORDS = {
     "cdpr_drake.systems.load_scenario": "a command that takes one, such as cdpr simulate",
     "camera.kind=projected": "--camera projected",
     "plot": "--plot",
-    "finish_run": "cdpr simulate --finish",
-    "continue_run": "cdpr simulate --continue",
 }  # fmt: skip
 """Commands and options in the place of functions and settings that messages name."""
 

@@ -29,9 +29,6 @@ INTERRUPTED = 130
 INCOMPLETE = 3
 """Exit code where the data is complete and something that is made of it is missing."""
 
-CLIENT_ENDED = 4
-"""Exit code of a run that ended early because of the process outside that closes its loop."""
-
 STUDY_FAILED = 5
 """Exit code of a reproduction of which a study failed; the report says which."""
 
@@ -140,13 +137,10 @@ GROUPS = (DEFAULT, COMPILED, *QUESTIONS, BROKEN)
 ROBOTS = Path(__file__).parents[1] / "models" / "robots"
 """A folder for each robot and mechanism that comes with the package."""
 
-SIMULATIONS = ("simulate", "serve", "studio")
+SIMULATIONS = ("simulate", "serve", "reactions", "studio")
 
 PROGRESS = "progress: "
 """How a line of progress begins where there is no terminal, and no other line on stderr does."""
-
-QUIET = ("--help", "--finish")
-"""Words with which nothing is computed."""
 
 _expected = 0
 
@@ -183,7 +177,7 @@ def expected_kernels() -> int:
 
 def _groups(command: str, words: Sequence[str]) -> list[str]:
     """Groups of the kernels that a command line needs."""
-    if any(word in QUIET for word in words):
+    if "--help" in words:
         return []
     if command == "workspace":
         return _groups_of_kinds(words)

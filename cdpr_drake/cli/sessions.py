@@ -1,4 +1,4 @@
-"""Runs and fits as `Follow` and `Result` have it, until their verbs do that themselves."""
+"""Fits as `Follow` and `Result` have it, until their verbs do that themselves."""
 
 from __future__ import annotations
 
@@ -9,14 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from cdpr_drake.analyses.frame.follow import Follow, Progress
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.front.session import Session
-from cdpr_drake.analyses.reporting.left_folders import holds_log
 from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
-from cdpr_drake.analyses.reporting.progress import WorkProgress
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import CdprError
 
@@ -28,47 +24,24 @@ NAMED = 3
 
 
 class FollowedSession(Session):
-    """Tells who follows a command how far a run or fit is."""
+    """Tells who follows a command what a fit does, and which files were kept."""
 
-    def __init__(self, follow: Follow, folder: Path | None = None, total: float = 0.0) -> None:
-        """Of one call.
-
-        Args:
-            follow: Who follows.
-            folder: Where results go, as the user named it.
-            total: Simulated time at most [s]; 0: it is not known.
-        """
+    def __init__(self, follow: Follow) -> None:
+        """Of one call."""
         super().__init__()
-        self.follow, self.folder, self.total = follow, folder, total
+        self.follow = follow
         self._results: ResultsFolder | None = None
-        self._now = Progress("starting", 0.0, total, unit="s")
-        self._continued = False
-
-    def stop(self) -> bool:
-        """True if somebody asked to stop."""
-        return self.follow.stop()
 
     def say(self, words: str) -> None:
         """Says a line."""
         self.follow.say(words)
 
-    def warn(self, words: str) -> None:
-        """Says a warning."""
-        self.say(f"warning: {words}")
-
     def opened(self, results: ResultsFolder) -> None:
-        """Says where results of killed runs went that nobody has seen yet."""
+        """Says where results of killed commands went that nobody has seen yet."""
         self._results = results
         for folder in results.recovered:
             where = shown_path(folder)
-            words = f"Found finished results of a run that was killed; they are in {where}"
-            if holds_log(folder):
-                words = (
-                    f"Found what a run had simulated that was killed; it is in {where}; cdpr "
-                    f"simulate --finish {where} makes log, summary and figures of it, --continue "
-                    "goes on"
-                )
-            self.say(words)
+            self.say(f"Found finished results of a command that was killed; they are in {where}")
 
     def kept(self) -> list[str]:
         """Which files of others were kept when results were replaced, and where."""
@@ -85,45 +58,18 @@ class FollowedSession(Session):
 
     @contextmanager
     def doing(self, words: str) -> Iterator[Callable[[str], None]]:
-        """Tells what is done beside computing."""
+        """Tells what is done."""
 
         def tell(what: str) -> None:
-            now = self._now
-            self.follow.progress(
-                Progress(what, now.done, now.total, now.found, now.unit, now.seconds)
-            )
+            self.follow.progress(Progress(what, 0.0, 0.0))
 
         tell(words)
         yield tell
 
-    def progress(self, progress: Any) -> None:
-        """Tells how far a run is, or runs over seeds."""
-        if isinstance(progress, WorkProgress):
-            self._now = Progress(
-                progress.what, progress.done, progress.total, progress.found, progress.items,
-                progress.wall_time,
-            )  # fmt: skip
-            if progress.found and not self._continued:
-                self._continued = True
-                count = f"{progress.found:.0f} of {progress.total:.0f} {progress.items}"
-                self.say(
-                    f"{self.folder}: complete already, nothing was computed"
-                    if progress.found == progress.total
-                    else f"Continuing in {self.folder}: {count} were there already"
-                )
-        else:
-            error = f"{1e3 * progress.position_error:.1f} mm"
-            turn = f"{np.degrees(progress.rotation_error):.1f} deg"
-            self._now = Progress(
-                f"error {error} {turn}", progress.sim_time, self.total, unit="s",
-                seconds=progress.wall_time,
-            )  # fmt: skip
-        self.follow.progress(self._now)
 
-
-def fit_session(folder: Path | None = None) -> FollowedSession:
+def fit_session() -> FollowedSession:
     """Of a fit, which Ctrl-C ends at once: nothing is finished and kept."""
-    return FollowedSession(Follow(say=message_console().print), folder)
+    return FollowedSession(Follow(say=message_console().print))
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

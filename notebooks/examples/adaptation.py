@@ -39,8 +39,8 @@ def numbers(run, path):
         {
             "largest distance from the true model's path": path.query(track)[0].max(),
             "length of the path": np.linalg.norm(np.diff(track, axis=0), axis=1).sum(),
-            "time with slack cables": run.numbers["slack_cable_seconds"],
-            "final error": run.numbers["final_position_error_m"],
+            "time with slack cables": run.as_dict()["slack_cable_seconds"],
+            "final error": run.as_dict()["final_position_error_m"],
         }
     )
 
@@ -61,5 +61,5 @@ print(f"{len(table)} runs that learn, relative to the same run without learning"
 print(table.agg(["median", "max"]).T.assign(above_1=(table > 1.0).sum()).round(3))
 for flaw, changes in FLAWS.items():
     runs = [approach(seed, 0.01, True, changes) for seed in range(count)]
-    doubted = sum(bool(run.numbers["adaptation"]["doubts"]) for run in runs)
+    doubted = sum(bool(run.as_dict()["adaptation"]["doubts"]) for run in runs)
     print(f"{flaw}: {doubted} of {count} runs doubted")

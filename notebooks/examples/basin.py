@@ -50,7 +50,7 @@ def run_block(block, count=20):
             continue
         with suppress(cdpr.CdprError):  # elastic cables do not hold the platform
             run = cdpr.simulate(replace(scenario, initial_pose=start, seed=seed))
-            row = {"scheme": scheme, "outcome": run.numbers["outcome"]}
+            row = {"scheme": scheme, "outcome": run.as_dict()["outcome"]}
             row["turn"] = f"from {np.degrees(R.ToAngleAxis().angle()) // 30 * 30:.0f} deg"
             verdicts = verdict.judge_all_verdicts(servo.case, servo.bounds, pose_rows([X_WP]))
             rows.append(row | {name: 100.0 * each.stable[0] for name, each in verdicts.items()})

@@ -49,9 +49,9 @@ for name, changes in CAMERAS.items():
         for seed in range(count):
             words = [scheme, f"seed={seed}", *changes, *FAST, *TIMES]
             run = cdpr.simulate("acrobot_pbvs", words)
-            goal = run.result.servo.desired_platform_pose().translation()
+            goal = run.built.desired_platform_pose().translation()
             rest = run.log["time"] >= run.log["time"][-1] - 2.0
             squares.append(np.sum((run.log["X_WP"][rest, 4:] - goal) ** 2, axis=1))
         errors.append(1e3 * np.sqrt(np.mean(squares)))
-    factor = noise_factor(run.result.servo)
+    factor = noise_factor(run.built)
     print(f"{name:26}", *(f"{error:7.3f}" for error in errors), f"{factor:14.2f}")

@@ -7,6 +7,6 @@ import cdpr_drake as cdpr
 
 if __name__ == "__main__":  # workers are new processes, which import this file
     changes = ["camera.kind=projected", "perturbations.anchor_points=0.005"]
-    found = cdpr.simulate("acrobot_pbvs", changes, "runs", seeds=range(4), workers=1)
-    print(found)
-    print("each, off at the end [mm]:", 1e3 * found.runs.table()["final_position_error_m"])
+    runs = cdpr.repeat_run("acrobot_pbvs", changes, seeds=range(4), workers=1, folder="runs")
+    print(runs)
+    print("each, off at the end [mm]:", 1e3 * runs.columns()["final_position_error_m"])

@@ -37,16 +37,16 @@ for camera, changes in {"fixed": ["camera.pan_tilt=null"], "pan-tilt": []}.items
         views = [run.log[column][1:, 0] > 0.0 for run in runs]  # row 0 is before the first image
         keeping = sum(view[np.argmax(view) :].all() for view in views)
         errors = [
-            run.numbers["final_position_error_m"]
+            run.as_dict()["final_position_error_m"]
             for run in runs
-            if run.numbers["outcome"] == "converged"
+            if run.as_dict()["outcome"] == "converged"
         ]
         print(
             f"{camera}, {scheme}: {count} starts; the tag is seen from {len(runs)} and kept in view"
             f" from {keeping}; {len(errors)} arrive within {1e3 * max(errors, default=0.0):.2f} mm"
         )
         if camera == "pan-tilt":
-            joints = [run.numbers["pan_tilt"] for run in runs]
+            joints = [run.as_dict()["pan_tilt"] for run in runs]
             seen = max(each["first_seen_s"] for each in joints)
             off = np.median([each["off_center_px"]["median"] for each in joints])
             turn = max(max(each["largest_angles_deg"]) for each in joints)

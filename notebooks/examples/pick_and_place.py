@@ -23,7 +23,7 @@ for case, change in CASES.items():
     runs = [
         cdpr.simulate("acrobot_pick_and_place", [*words, f"seed={seed}"]) for seed in range(count)
     ]
-    placed = [run.numbers for run in runs if run.numbers["outcome"] == "completed"]
+    placed = [run.as_dict() for run in runs if run.as_dict()["outcome"] == "completed"]
     print(f"goal {case}: {len(placed)} of {count} boxes are set down")
     if placed:
         errors = 1e3 * np.array([numbers["set_down_error_m"] for numbers in placed])
@@ -34,5 +34,5 @@ for case, change in CASES.items():
             f" {errors.max():.2f} mm and {angle:.2f} deg; {unseen:.1f} s without the tag"
         )
     for run in runs:
-        if run.numbers["outcome"] != "completed":
-            print(f"    seed {run.numbers['seed']}: {run.numbers['message']}")
+        if run.as_dict()["outcome"] != "completed":
+            print(f"    seed {run.as_dict()['seed']}: {run.as_dict()['message']}")

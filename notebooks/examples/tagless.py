@@ -36,7 +36,7 @@ def starts(count):
 def errors(run):
     """Distance [mm] and angle [deg] of the platform from its goal at rest, root mean squares."""
     rest = run.log["time"] >= run.log["time"][-1] - 1.0
-    goal = pose_row(run.result.servo.desired_platform_pose())
+    goal = pose_row(run.built.desired_platform_pose())
     distances, angles = pose_rows_distance(run.log["X_WP"][rest], goal[np.newaxis])
     return 1e3 * np.sqrt(np.mean(distances**2)), np.degrees(np.sqrt(np.mean(angles**2)))
 

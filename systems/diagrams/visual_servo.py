@@ -155,8 +155,8 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     """
     if not isinstance(scenario, Scenario):
         raise ScenarioError(
-            f"{scenario.name}: kind: found {scenario.kind}; accepted: {VISUAL_SERVO}; for this one "
-            "use cdpr_drake.analyses.simulation.run_tension_scenario"
+            f"{scenario.name}: kind: found {scenario.kind}; accepted: {VISUAL_SERVO}; "
+            "cdpr_drake.simulate runs all kinds"
         )
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()

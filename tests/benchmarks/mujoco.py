@@ -11,7 +11,8 @@ import numpy as np
 from mujoco import rollout
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.analyses.simulation.tension_control_run import make_control, make_simulator
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_in_plant import platform_inertia
@@ -65,7 +66,10 @@ def dynamic_ways() -> dict[str, Callable[[], float]]:
     }
     for engine in (COMPILED, PLANT):
         scenario = dynamic_scenario(engine)
-        simulator = make_simulator(make_control(scenario), scenario)
+        built, rule = TensionRun(scenario).built, scenario.integration
+        simulator = fixed_step_simulator(
+            built.diagram, built.make_context(), rule.integrator, rule.max_step
+        )
         simulator.Initialize()
         ways[f"dynamic loop in a diagram, {engine} engine"] = partial(_advance, simulator)
     tendons = TendonLoop(dynamic_scenario(PLANT))
@@ -89,7 +93,7 @@ def dynamic_scenario(engine: str) -> TensionScenario:
 def compiled_loop() -> TensionLoop:
     """The compiled loop of the scenario at the start of its trajectory."""
     scenario = dynamic_scenario(COMPILED)
-    return TensionLoop(make_control(scenario), scenario.log_rate)
+    return TensionLoop(TensionRun(scenario).built, scenario.log_rate)
 
 
 def tendon_model(robot: Robot, step: float) -> Any:

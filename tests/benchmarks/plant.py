@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.analyses.simulation.monte_carlo import run_many
+from cdpr_drake.analyses.runs.seeds import run_many
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT, CableRobot

@@ -72,8 +72,5 @@ if __name__ == "__main__":
 """
 
 
-STORE = "cdpr_drake.analyses.simulation.monte_carlo_store.StoredRuns.store"
-"""Keeps a run over a seed."""
-
 STORE_ARRAYS = "cdpr_drake.analyses.frame.folder.Folder.write_arrays"
 """Keeps a chunk of a grid."""

@@ -9,18 +9,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.folder import Folder
-from cdpr_drake.analyses.front import simulation
-from cdpr_drake.analyses.reporting.deferred_figures import write_pictures
 
 
 @contextmanager
 def only(*endings):
     """Lets runs and grids write their data and, of pictures, files with these endings."""
-
-    def write(folder, pictures, *more):
-        kept = {name: draw for name, draw in pictures.items() if name.endswith(endings)}
-        return write_pictures(folder, kept, *more)
-
     write_files = Folder.write_all
 
     def write_all(folder, writers, *more):
@@ -28,7 +21,6 @@ def only(*endings):
         return write_files(folder, kept, *more)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "write_pictures", write)
         patch.setattr(Folder, "write_all", write_all)
         yield
 

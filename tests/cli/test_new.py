@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -82,7 +81,7 @@ def test_a_robot_of_ones_own_arrives_with_taut_cables(capsys, here):
     assert said == ""
     assert "robot: bay.yaml\n" in path.read_text()  # so that the folder can be moved
     quick = ["camera.kind=projected", "integration.engine=compiled", "integration.loop=compiled"]
-    told = summarize(run_scenario(load_scenario(str(path), quick)))
+    told = ServoRun(load_scenario(str(path), quick)).simulate().as_dict()
     assert (told["outcome"], told["message"]) == ("converged", "")
     assert told["slack_cable_seconds"] == 0.0
     low, high = load_robot(here / "bay.yaml").tension_limits()

@@ -2,20 +2,18 @@
 
 import pytest
 
+from cdpr_drake.analyses.frame.follow import NOBODY
 from cdpr_drake.analyses.front.calibration import calibrate
-from cdpr_drake.analyses.front.simulated_fits import (
-    calibrate_in_simulation,
-    identify_in_simulation,
-)
-from cdpr_drake.analyses.front.simulation import simulate
-from cdpr_drake.analyses.simulation.live_messages import open_connection
+from cdpr_drake.analyses.front.simulated_fits import calibrate_in_simulation, identify_in_simulation
+from cdpr_drake.analyses.runs.simulate import simulate
+from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.studies.study import run_study
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.call import parsed
-from cdpr_drake.cli.option_names import with_options
-from cdpr_drake.cli.simulate import PYTHON_NAMES
+from cdpr_drake.cli.option_names import COMMAND_WORDS, with_options
 from cdpr_drake.errors import CdprError
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.server_socket import ServerSocket
 from tests.cli.commands import run
 
@@ -32,8 +30,6 @@ NOWHERE = "192.0.2.1"
         (lambda: simulate(SCENARIO, ["seed=x", "a=1"]),
          ["simulate", SCENARIO, "--set", "seed=x", "--set", "a=1"],
          "overrides a: there is no key", "--set a: there is no key"),
-        (lambda: simulate(SCENARIO, folder="there"), ["simulate", SCENARIO, "--out", "there"],
-         "overwrite", "--overwrite"),
         (lambda: run_study("case-9", workers="tcp://127.0.0.1:1"),
          ["study", "case-9", "--workers", "tcp://127.0.0.1:1"],
          "workers: tcp://127.0.0.1:1 does not answer",
@@ -49,9 +45,9 @@ NOWHERE = "192.0.2.1"
         (lambda: ServerSocket(NOWHERE, 0, lambda: False),
          ["serve", TORQUES, "--host", NOWHERE, "--port", "0"],
          f"host, port: found {NOWHERE}:0", f"--host, --port: found {NOWHERE}:0"),
-        (lambda: open_connection(-5),
+        (lambda: steered(NOBODY, load_scenario(SCENARIO), -5),
          ["simulate", SCENARIO, "--set", "camera.kind=projected", "--steered-by", "-5"],
-         "descriptor: found -5", "--steered-by: found -5"),
+         "steered_by: found -5", "--steered-by: found -5"),
         (lambda: simulate(SCENARIO, log_formats=["xls"]),
          ["simulate", SCENARIO, "--log-format", "xls"],
          "log_formats: found 'xls'", "--log-format: found 'xls'"),
@@ -68,8 +64,6 @@ def test_python_reads_arguments_and_the_command_options(
     call, arguments, python, command, here, monkeypatch, capsys
 ):
     monkeypatch.setattr("cdpr_drake.analyses.frame.cluster.SCHEDULER_TIMEOUT", 0.3)
-    (here / "there").mkdir()
-    (here / "there" / "notes.txt").touch()
     with pytest.raises(CdprError) as refused:
         call()
     assert python in str(refused.value)
@@ -110,19 +104,12 @@ def test_options_stand_where_arguments_are_named(message, translated):
 
 
 def test_functions_become_commands():
-    words = "finish_run makes log and figures of that folder, continue_run goes on"
-    assert with_options(words, PYTHON_NAMES) == (
-        "cdpr simulate --finish makes log and figures of that folder, "
-        "cdpr simulate --continue goes on"
-    )
-    assert with_options("or use camera.kind=projected", PYTHON_NAMES) == (
+    assert with_options("or use camera.kind=projected", COMMAND_WORDS) == (
         "or use --camera projected"
     )
 
 
 def test_commands_stand_in_the_place_of_functions():
     options = parsed(["simulate", "acrobot_pbvs"]).options
-    said = with_options("log.npz: found an end; finish_run makes results of it", options)
-    assert said == "log.npz: found an end; cdpr simulate --finish makes results of it"
     said = with_options("plot: found 'a'; accepted: tensions", options)
     assert said == "--plot: found 'a'; accepted: tensions"

@@ -32,7 +32,6 @@ FILES = {
 FOLDERS = ("empty", "acrobot_pbvs", "old")
 
 QUICK = "--camera projected --duration 0.3"
-TALE = "acrobot_broken_redistributed --compare-reactions 5 --break-time 0.3 --after 0.3"
 NOBODY = "tcp://127.0.0.1:9"
 
 REFUSED = {
@@ -67,25 +66,21 @@ REFUSED = {
         ("--duration -1", "duration", "> 0"),
         ("--seed 1.5", "--seed"),
         ("--out file", "found a file"),
-        ("--out full", "holds files already", "or add --overwrite"),
+        ("--out full", "holds files that cdpr did not write", "name another folder"),
         ("--out file/below", "cannot be written"),
         (f"{QUICK} --port 7000", "--port: found alone; accepted: with --meshcat"),
-        ("--finish mine", "holds no log"),
-        ("--finish no/such/folder", "not there"),
-        ("acrobot_pbvs --camera projected --finish mine",
-         "--camera, scenario: found with --finish"),
-        ("--continue nothing", "holds no log"),
-        ("--continue a --finish a", "--finish: found with --continue"),
-        ("acrobot_mobile_robot --continue a", "scenario: found with --continue"),
+        ("acrobot_computed_torque --camera projected", "--camera: found with acrobot_computed"),
         ("--seeds 0:2 --seed 3", "--seed: found with --seeds; accepted: without"),
         ("--seeds 0:2 --video", "--video: found with --seeds; accepted: without"),
-        ("--workers 2", "--workers: found alone; accepted: with --seeds"),
-        ("acrobot_computed_torque --seeds 0:2", "accepted: with visual servos"),
+        ("--workers 2", "--workers: found without --seeds; accepted: with"),
+        ("acrobot_computed_torque --seeds 0:2", "--seeds: found with a tension_control"),
         ("--seeds 0:2 --set initial_pose.position=[0,0,1.1]", "cannot hold"),
-        (f"{QUICK} --seeds 1 --workers 1 --out .", "found the working folder or one above it"),
-        (f"{TALE} --duration 3", "--duration: found with --compare-reactions"),
-        (f"{TALE} --seeds 0:3", "--seeds: found with --compare-reactions"),
-        ("acrobot_pbvs --after 1", "--after: found alone; accepted: with --compare-reactions"),
+        (f"{QUICK} --seeds 1 --workers 1 --out . --set integration.engine=plant",
+         "found the working folder, one above it"),
+    ],
+    "finish": [
+        ("empty", "found no log of an interrupted run"),
+        ("no/such/folder", "found no log of an interrupted run"),
     ],
     "serve": [
         ("acrobot_computed_torque --place servo", "distributor, controller, trajectory"),

@@ -12,7 +12,7 @@ from typing import Any
 
 from setuptools import find_packages
 
-from cdpr_drake.analyses.simulation.monte_carlo import ManyRuns
+from cdpr_drake.analyses.runs.seeds import Repetition
 from cdpr_drake.analyses.templates import FILES, file_schema
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
@@ -32,7 +32,7 @@ FILE = re.compile(
 )
 """Names of files, which are no keys."""
 
-VALUES = {"robot": Robot, "cables": CableSet, "runs": ManyRuns, "bench": Workbench}
+VALUES = {"robot": Robot, "cables": CableSet, "runs": Repetition, "bench": Workbench}
 """What the pages' own variables are, of which they name methods."""
 
 PATTERNS = ("exit_NAME", "anchor_NAME", "scan_NAME")

@@ -25,7 +25,7 @@ WHOLE = (FIRST, DOCS / "tutorial.md")
 """Pages whose runs go on to their end; those of others begin as their page says, and are short:
 each scenario runs to its end where its own room is tested."""
 
-SHORT = {"simulate": ["--duration", "0.5"], "reactions": ["--break-time", "0.2", "--after", "0.2"]}
+SHORT = {"simulate": ["--duration", "0.5"], "reactions": ["--time", "0.2", "--after", "0.2"]}
 """Words that make a run short, whatever a page says before them."""
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```", re.DOTALL | re.MULTILINE)
@@ -83,8 +83,8 @@ def test_commands_run(page, tmp_path, monkeypatch):
             for line in code.replace("\\\n", " ").splitlines():
                 program, *words = shlex.split(line, comments=True)
                 assert program == "cdpr", line
-                if words[0] == "simulate" and page not in WHOLE:
-                    words += SHORT["reactions" if "--compare-reactions" in words else "simulate"]
+                if words[0] in SHORT and page not in WHOLE:
+                    words += SHORT[words[0]]
                 assert exit_code(words) == 0, line
 
 

@@ -23,6 +23,7 @@ RECIPES = {
     "scheme": "A scheme of visual servoing",
     "target": "A target",
     "sensor": "A sensor",
+    "run_subject": "A subject of a run",
     "study": "A study",
     "subcommand": "A subcommand",
 }

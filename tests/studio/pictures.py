@@ -17,7 +17,7 @@ from PIL import Image
 from selenium.webdriver.common.keys import Keys
 
 from cdpr_drake.analyses.front.logs import replay_log
-from cdpr_drake.analyses.front.simulation import simulate
+from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.command_board import ABOUT
 from cdpr_drake.studio.workbench.result_subject import subject_of

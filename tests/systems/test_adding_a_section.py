@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.schema.fields import number, section
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -48,9 +48,9 @@ class CountedScenario(Scenario):
 
 def test_a_scenario_section():
     overrides = [*QUICK, "counter.rate=100"]
-    result = run_scenario(load_scenario("acrobot_pbvs", overrides, schema=CountedScenario))
-    counter = result.servo.diagram.GetSubsystemByName("counter")
-    assert result.servo.scenario.counter.rate == 100.0
+    result = ServoRun(load_scenario("acrobot_pbvs", overrides, schema=CountedScenario)).simulate()
+    counter = result.built.diagram.GetSubsystemByName("counter")
+    assert result.built.scenario.counter.rate == 100.0
     assert counter.GetOutputPort("count").size() == 1
     with pytest.raises(ScenarioError, match="counter"):
         load_scenario("acrobot_pbvs", overrides)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from nicegui import ui
 
-from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH
+from cdpr_drake.analyses.runs.steering import BREAK, PUSH
 from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.run_job import RunJob

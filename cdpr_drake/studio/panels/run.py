@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary, ref
 
 from nicegui import run, ui
 
+from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -389,12 +390,8 @@ def _robot_of(shown: RunEntry) -> Robot | None:
 
 
 def _left_log(job: RunJob) -> bool:
-    """Whether a run that was killed left what it had simulated."""
-    folder = job.folder
-    if folder is None:
-        return False
-    hidden = folder.parent.glob(f".{folder.name}-work-*/log.parts")
-    return any(hidden) or (folder.with_name(f"{folder.name}-unfinished")).is_dir()
+    """True if a run that was killed left the log of what it had simulated."""
+    return job.folder is not None and (job.folder / PARTS).is_dir()
 
 
 def _subject_named(robot: str) -> Subject | None:

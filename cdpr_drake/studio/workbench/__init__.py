@@ -12,8 +12,8 @@ Jobs: work that the studio's server has, in processes of their own, since Drake 
 Python's lock, and since what kills a run must not kill the server. A job belongs to the server, not
 to a page: whoever closes or reloads a page, or opens another, finds it as it is. `CommandJob` is
 any `cdpr` subcommand, `RunJob` a `cdpr simulate` that is followed and steered, see
-`analyses.simulation`. `JobManager` lets a few of them run at a time. Threads of any kind may call
-every job and the manager.
+`analyses.runs.steering`. `JobManager` lets a few of them run at a time. Threads of any kind may
+call every job and the manager.
 
 Commands: a `CommandForm` says which options a command takes; the command line makes it from its own
 functions, so that there is no second list of them. `CommandBoard` starts commands in the working

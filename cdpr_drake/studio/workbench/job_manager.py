@@ -8,7 +8,6 @@ import time
 from pathlib import Path
 from typing import TypeVar
 
-from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.studio.workbench.job import Event, Job, JobError, JobState
 
 MOST_JOBS = 200
@@ -72,17 +71,16 @@ class JobManager:
         return job
 
     def free_folder(self, base: Path) -> Path:
-        """`base`, or the first of base-2, base-3, ... that is not there, that nobody writes, and
-        that no job will write."""
+        """The first of base, base-2, ... that is not there and that no job will write."""
         with self._lock:
             taken = {
                 Path(getattr(job, "folder", None) or "") for job in self._jobs
                 if not job.state.is_over
             }  # fmt: skip
-            number, folder = 1, free_folder(base)
-            while folder in taken:
-                number += 1
-                folder = free_folder(base.with_name(f"{base.name}-{number}"))
+        number, folder = 1, base
+        while folder.exists() or folder in taken:
+            number += 1
+            folder = base.with_name(f"{base.name}-{number}")
         return folder
 
     def close(self, seconds: float = LONGEST_END) -> None:

@@ -100,10 +100,10 @@ class RunBoard:
         return job
 
     def recover(self, job: RunJob) -> CommandJob:
-        """Makes results of what a run had simulated that was killed."""
+        """Writes results of a run that was killed, as far as it was simulated."""
         assert job.folder is not None
         title = f"{job.title}: results of what there is"
-        arguments = ["simulate", f"--finish={job.folder}", "--json"]
+        arguments = ["finish", str(job.folder), "--json"]
         return self._jobs.submit(CommandJob(title, arguments, self._root, job.folder))
 
     def choices(self) -> dict[str, RunEntry]:

@@ -15,9 +15,15 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.simulation.by_hand import BREAK, PUSH
-from cdpr_drake.analyses.simulation.live_messages import Message, receive, send
-from cdpr_drake.analyses.simulation.realtime_rate import FASTEST_SPEED, SLOWEST_SPEED
+from cdpr_drake.analyses.runs.steering import (
+    BREAK,
+    FASTEST_SPEED,
+    PUSH,
+    SLOWEST_SPEED,
+    Message,
+    receive,
+    send,
+)
 from cdpr_drake.studio.workbench.command_job import CommandJob
 from cdpr_drake.studio.workbench.job import Event, JobError, JobState
 from cdpr_drake.studio.workbench.job_process import Child, progress_of
@@ -68,10 +74,10 @@ class RunJob(CommandJob):
         scenario: Its name or the path of its file.
         settings: Items key=value that replace what the file says.
         samples: What it has shown so far.
-        header: What it said at its beginning, see `analyses.simulation.live_messages`; empty
+        header: What it said at its beginning, see `analyses.runs.steering`; empty
             before.
         image: The newest image as JPEG; empty where there is none.
-        events: What was done to it by hand, or refused, see `analyses.simulation.live_messages`.
+        events: What was done to it by hand, or refused, see `analyses.runs.steering`.
         pace: Whether it stands, and its speed, as it said last.
     """
 

@@ -14,8 +14,7 @@ from typing import Any
 import yaml
 
 import cdpr_drake
-from cdpr_drake.analyses.simulation.by_hand import UNTOUCHED
-from cdpr_drake.analyses.simulation.live_control import check_steered
+from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, DataFileError, ScenarioError
 from cdpr_drake.schema.fields import FieldRule
 from cdpr_drake.schema.typed_yaml import rules_of

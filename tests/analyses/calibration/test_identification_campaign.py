@@ -8,7 +8,7 @@ from cdpr_drake.analyses.calibration import identification_campaign as campaign
 from cdpr_drake.analyses.calibration.identification_task import IdentificationTask, identify
 from cdpr_drake.analyses.calibration.log_file import read_log
 from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -84,9 +84,9 @@ def test_the_logs_that_it_leaves_say_the_same(folder):
 def test_its_scenario_runs_with_the_robot_that_was_found(folder):
     path = str(folder[0] / "scenario.yaml")
     changes = ("integration.engine=compiled", "duration=1.0")
-    good = run_tension_scenario(load_scenario(path, changes))
+    good = TensionRun(load_scenario(path, changes)).simulate()
     belief = f"perturbations.believed_robot={folder[0] / 'believed_robot.yaml'}"
-    bad = run_tension_scenario(load_scenario(path, (*changes, belief)))
+    bad = TensionRun(load_scenario(path, (*changes, belief))).simulate()
 
     def off(run):
         return np.linalg.norm((run.log["X_WP"] - run.log["X_WP_desired"])[:, 4:], axis=1)

@@ -13,7 +13,7 @@ import pytest
 from cdpr_drake.analyses.frame import cluster as module
 from cdpr_drake.analyses.frame.job import ProcessDied
 from cdpr_drake.analyses.frame.jobs import finished_jobs
-from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
+from cdpr_drake.analyses.runs.seeds import run_many, with_seeds
 from cdpr_drake.errors import SweepError
 from cdpr_drake.schema.input_files import input_text, inputs_read_once
 from cdpr_drake.systems.diagrams.load import load_scenario

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.result import Result
-from cdpr_drake.analyses.front.simulation import RepeatedRuns, Run
 from cdpr_drake.summaries import MOST_LINES, Summarized
 
 STUB = Path(cdpr.__file__).with_suffix(".pyi")
@@ -57,8 +56,8 @@ def verbs():
 
 
 def result_classes():
-    """What the verbs return; `simulate` says so in words, since mypy could not tell which."""
-    found = {Run, RepeatedRuns}
+    """What the verbs return."""
+    found = set()
     for verb in verbs().values():
         told = get_type_hints(verb)["return"]
         found |= {one for one in (get_args(told) or (told,)) if inspect.isclass(one)}

@@ -21,7 +21,8 @@ from tests.analyses.front.front_checks import HOMES, RESULTS, as_json, one_line,
 
 PROMISED = """
     __version__ load_robot robot_names load_scenario scenario_names Robot Scenario CableSet Pose
-    import_robot export_robot simulate continue_run finish_run Session solve_tensions distribute
+    import_robot export_robot simulate repeat_run run_many serve finish_run Session
+    solve_tensions distribute
     TensionProblem TensionSolution TENSION_METHODS solve_static find_equilibria
     solve_forward_kinematics solve_inverse_kinematics plot compute_workspace assess_stability
     plan_path plan_free_motion reconfigure plan_proven_motion calibrate identify optimize_design

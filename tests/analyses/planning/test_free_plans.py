@@ -8,7 +8,7 @@ from cdpr_drake.analyses.planning.free_motion import solve_free_motion
 from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import RESERVE, path_task, robot_limits
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -62,7 +62,7 @@ def scenario_of(folder, *more):
 def test_planned_limits_hold_in_the_run_of_a_scenario(folder, tmp_path):
     robot, scenario = load_robot("acrobot_large"), scenario_of(folder)
     limits = robot_limits(robot, (1.0, 60.0))
-    log = run_tension_scenario(scenario).log
+    log = TensionRun(scenario).simulate().log
     assert log["failures"][-1, 0] == 0
     assert np.min(log["tensions"][1:]) >= limits.lower - 1e-9
     assert np.max(log["tensions"][1:]) <= limits.upper + 1e-9

@@ -6,7 +6,7 @@ import yaml
 
 from cdpr_drake.analyses.planning.motions_in_sets import judged
 from cdpr_drake.analyses.planning.proven_plan import plan_proven_motion
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.workspaces.proven_sets import (
     ProofSettings,
     ProvenSets,
@@ -70,7 +70,7 @@ def test_a_scenario_tracks_it(folder):
         "duration=0.5", "integration.engine=compiled",
     ]  # fmt: skip
     scenario = load_scenario("acrobot_computed_torque", changes)
-    assert run_tension_scenario(scenario).log["failures"][-1, 0] == 0
+    assert TensionRun(scenario).simulate().log["failures"][-1, 0] == 0
 
 
 @pytest.mark.usefixtures("undrawn")

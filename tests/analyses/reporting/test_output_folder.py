@@ -11,12 +11,8 @@ import pytest
 from cdpr_drake.analyses.reporting import output_folder
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
-from cdpr_drake.analyses.reporting.log_on_disk import LAYOUT, PARTS
 from cdpr_drake.analyses.reporting.output_folder import (
-    continued_folder,
     results_folder,
-    resumed_folder,
-    unfinished_folder,
 )
 from cdpr_drake.analyses.reporting.written_files import MARKER, list_all, mark
 from cdpr_drake.errors import OutputFolderError
@@ -44,12 +40,6 @@ def seen(folder):
 
 def listed(folder):
     return json.loads((folder / MARKER).read_text())["files"]
-
-
-def unfinished_log(folder):
-    """A log in the making."""
-    (folder / PARTS).mkdir(parents=True)
-    (folder / PARTS / LAYOUT).write_text("{}")
 
 
 def write_old(results):
@@ -151,44 +141,12 @@ FULL = OSError(errno.ENOSPC, "full", ELSEWHERE)
         (results_folder, FULL, ELSEWHERE),
         (results_folder, OSError(errno.EACCES, "not allowed"), None),
         (results_folder, OSError(errno.EACCES, "not allowed", ELSEWHERE), ELSEWHERE),
-        (continued_folder, FULL, ELSEWHERE),
     ],
 )
 def test_what_fails_elsewhere_keeps_its_name(tmp_path, prepared, problem, named):
     ended = broken_off(prepared, tmp_path / "out", lambda results: None, problem)
     assert ended is problem
     assert ended.filename == named
-
-
-@pytest.mark.parametrize("file", ["out/x", None])
-def test_what_fails_in_a_continued_folder_is_said_of_it(tmp_path, file):
-    problem = OSError(errno.ENOSPC, "full", file and str(tmp_path / file))
-    ended = broken_off(continued_folder, tmp_path / "out", lambda results: None, problem)
-    assert isinstance(ended, OutputFolderError)
-    assert str(ended) == f"{tmp_path / 'out'}: cannot be written: full"
-
-
-def test_the_log_of_a_run_that_fails_gets_a_name_that_can_be_seen(tmp_path):
-    ended = broken_off(
-        results_folder, tmp_path / "out", lambda results: unfinished_log(results.path)
-    )
-    target = tmp_path / "out-unfinished"
-    assert os.listdir(tmp_path) == [target.name]
-    assert any(f"is in {target}" in note for note in ended.__notes__)
-    # It goes on there, and what is written then is known as the program's own.
-    with resumed_folder(target) as results:
-        assert results.published
-        write_whole(results.path / "summary.json", "{}")
-    assert listed(target) == [f"{PARTS}/{LAYOUT}", "summary.json"]
-
-
-def test_a_published_run_that_fails_keeps_its_name_and_its_log(tmp_path):
-    def work(results):
-        unfinished_log(results.path)
-        results.publish()
-
-    broken_off(results_folder, tmp_path / "out", work)
-    assert os.listdir(tmp_path) == ["out"]
 
 
 def test_overwrite_replaces_at_the_end(tmp_path):
@@ -207,9 +165,7 @@ def test_overwrite_replaces_at_the_end(tmp_path):
     [
         (results_folder, "out", False, "add overwrite"),
         (results_folder, "thesis", True, "did not write"),
-        (continued_folder, "thesis", True, "did not write"),
         (results_folder, "link", True, "did not write"),
-        (continued_folder, "link", True, "did not write"),
         (results_folder, "file", True, "found a file"),
         (results_folder, "file/out", True, "cannot be written"),
         (results_folder, "/proc", True, "mount point"),
@@ -226,7 +182,7 @@ def test_what_is_there_is_refused_and_stays(tmp_path, prepared, name, overwrite,
     assert (tmp_path / "thesis" / "chapter_1.tex").read_text() == "years"
 
 
-@pytest.mark.parametrize("prepared", [results_folder, continued_folder])
+@pytest.mark.parametrize("prepared", [results_folder])
 @pytest.mark.parametrize("name", [".", "..", "../..", "/", "below/.."])
 def test_the_working_folder_and_what_is_above_it_is_refused(tmp_path, monkeypatch, prepared, name):
     here = tmp_path / "a" / "b"
@@ -295,59 +251,6 @@ def test_a_lock_that_a_killed_run_left_is_none(tmp_path):
     with results_folder(tmp_path / "run"):
         pass
     assert os.listdir(tmp_path) == ["run"]
-
-
-def test_what_is_in_a_continued_folder_stays_whatever_happens(tmp_path):
-    broken_off(continued_folder, tmp_path / "out", part)
-    with continued_folder(tmp_path / "out") as results:
-        assert seen(results.path) == ["part"]
-
-
-@pytest.mark.parametrize("begun", [True, False])
-def test_overwriting_a_continued_folder_keeps_the_old_and_its_name_until_the_end(tmp_path, begun):
-    target, before = ours(tmp_path / "out"), tmp_path / "out-before"
-    ended = broken_off(
-        continued_folder, target, part if begun else lambda results: None, overwrite=True
-    )
-    assert getattr(ended, "__notes__", []) == [f"older results are in {before}"] * begun
-    assert seen(before if begun else target) == ["old"]
-    assert not begun or seen(target) == ["part"]
-    with continued_folder(target, overwrite=True) as results:
-        assert not results.path.exists()
-        results.path.mkdir()
-    assert sorted(os.listdir(tmp_path)) == ["out", "out-before"][: 1 + begun]
-
-
-@pytest.mark.parametrize("there", [True, False])
-@pytest.mark.parametrize("noted", [True, False])
-@pytest.mark.parametrize("problem", [KeyboardInterrupt, RuntimeError])
-def test_ctrl_c_says_once_where_what_was_finished_is(tmp_path, problem, noted, there):
-    elsewhere, ended = "what was finished is elsewhere", problem()
-    if noted:
-        ended.add_note(elsewhere)
-    broken_off(continued_folder, tmp_path / "out", part if there else lambda results: None, ended)
-    notes = [f"what was finished is kept in {tmp_path / 'out'}; the same command continues"]
-    notes = notes if there and not noted and problem is KeyboardInterrupt else []
-    assert getattr(ended, "__notes__", []) == notes + noted * [elsewhere]
-
-
-@pytest.mark.parametrize("name", ["out", ".out-work-abc"])
-def test_the_log_of_a_killed_run_is_found_by_its_name(tmp_path, name):
-    unfinished_log(tmp_path / name)
-    mark(tmp_path / name)
-    with unfinished_folder(tmp_path / "out") as found:
-        assert found == tmp_path / ("out" if name == "out" else "out-unfinished")
-        assert (found / PARTS / LAYOUT).is_file()
-        write_whole(found / "summary.json", "{}")
-    assert "summary.json" in listed(found)
-
-
-@pytest.mark.parametrize("prepared", [unfinished_folder, resumed_folder])
-@pytest.mark.parametrize(("name", "words"), [("out", "holds no log"), ("a/out", "not there")])
-def test_where_there_is_no_log_that_is_said(tmp_path, prepared, name, words):
-    (tmp_path / "out").mkdir()
-    with pytest.raises(OutputFolderError, match=words), prepared(tmp_path / name):
-        pass
 
 
 def test_free_folder_counts_up(tmp_path):

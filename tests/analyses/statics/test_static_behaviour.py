@@ -3,12 +3,13 @@ and pictures."""
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation.behaviour_loops import loop_figure, shows_loops
+from cdpr_drake.analyses.runs.sections import BEHAVIOUR, loop_figure
 from cdpr_drake.cables.cable_behaviour import tension_of_strain
 from cdpr_drake.cables.models import check_model
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
@@ -176,14 +177,15 @@ def test_the_picture_has_what_the_file_has():
 def test_loops_of_a_run_are_those_of_its_log():
     """A platform that was turned one way and back: the moments of its contacts, by Dahl."""
     robot = rubbing(small_robot("hanging_four"))
-    assert shows_loops(robot)
-    assert not shows_loops(small_robot("hanging_four"))
+    assert BEHAVIOUR.applies(SimpleNamespace(robot=robot))
+    assert not BEHAVIOUR.applies(SimpleNamespace(robot=small_robot("hanging_four")))
     s = np.concatenate([np.linspace(0.0, 0.2, 50), np.linspace(0.2, -0.1, 50)[1:]])
     X_WP = np.zeros((len(s), 7))
     X_WP[:, 0], X_WP[:, 3] = np.cos(s / 2.0), np.sin(s / 2.0)
     log = {"X_WP": X_WP, "tensions": np.ones((len(s), 4)), "lengths": np.ones((len(s), 4)),
            "unstrained_lengths": np.full((len(s), 4), 0.999)}  # fmt: skip
-    x, y = labelled(loop_figure("A run", robot, log).axes[0], "about z of P").get_data()
+    run = SimpleNamespace(robot=robot, log=log, title=str)
+    x, y = labelled(loop_figure(run).axes[0], "about z of P").get_data()
     contacts, K = robot.contact_hysteresis(), 0.5
     top = contacts.bent(0.2)
     assert np.max(y) == pytest.approx(K * top, rel=1e-9)

@@ -8,8 +8,8 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.simulation.run_stability import stability_along
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.stability import stability_along
 from cdpr_drake.analyses.studies.closed_loops import (
     MANAGED,
     MODES,
@@ -188,7 +188,7 @@ def test_whether_a_loop_with_slack_arrives(robots, worst, mass, managed, expecte
     ]  # fmt: skip
     made = perturbed_scenario(load_scenario("acrobot_pbvs", items), HANGING, worst)
     made.estimator.kind, made.sensors.tracker = "shifted", "ideal"
-    result = run_scenario(made)
+    result = ServoRun(made).simulate()
     along = stability_along(result)
     assert (result.outcome.name, along.taut[-1]) == (expected, taut)
     if taut == 8:

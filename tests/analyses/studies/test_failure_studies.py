@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cdpr_drake.analyses.simulation.break_report import (
+from cdpr_drake.analyses.runs.breaks import (
     STOP,
     holds_without,
     leaves,

@@ -7,7 +7,6 @@ import pandas as pd
 import pytest
 from scipy.optimize import linprog
 
-from cdpr_drake.analyses.simulation.run_loop import LoopEnd
 from cdpr_drake.analyses.studies import tension_trials as trials
 from cdpr_drake.analyses.studies.tension_methods import GAINS, near_instability
 from cdpr_drake.analyses.studies.tension_trials import (
@@ -36,7 +35,6 @@ from cdpr_drake.systems.diagrams.tension_control import (
     TensionControlSettings,
     build_tension_control,
 )
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -102,13 +100,6 @@ def test_what_is_out_of_bounds_falls_held_and_stays_pushed():
     assert pushed["tension_min_n"] < 0.0
     assert pushed["negative_tensions"] > 0
     assert pushed["position_error_max_m"] < TRACKING
-
-
-def test_what_is_interrupted_is_no_run(monkeypatch):
-    end = LoopEnd(Outcome.INTERRUPTED, "", 0.0)
-    monkeypatch.setattr(trials, "advance", lambda *_: end)
-    with pytest.raises(KeyboardInterrupt):
-        run()
 
 
 @pytest.mark.parametrize(

@@ -128,3 +128,21 @@ def test_names_of_frames_at_one_place_are_beside_each_other():
     names = [text for text in figure.axes[0].texts if text.get_text().strip() in ("W", "P")]
     first, second = (text.get_window_extent() for text in names)
     assert not first.shrunk(0.9, 0.9).overlaps(second)
+
+
+def test_tensions_that_chatter_are_a_curve_of_means_in_a_band_of_extremes():
+    """Thirty seconds of noise once were a thick band of the curve's colour."""
+    times, robot = np.linspace(0.0, 30.0, 1501), load_robot("acrobot_large")
+    chatter = 0.8 * np.random.default_rng(3).uniform(-1.0, 1.0, 1501)
+    tensions = np.tile(10.0 + np.arange(8.0), (1501, 1))
+    tensions[:, 1] += np.sin(times)  # which is no chatter
+    tensions[:, 2] += chatter
+    log = {"time": times, "slack": np.zeros((1501, 8)), "tensions": tensions}
+    axes = cable_figure("t", robot, log, "tensions", "tension [N]", bounds=(0.0, 60.0)).axes[0]
+    (band,) = axes.collections
+    extent = band.get_paths()[0].get_extents()
+    assert (extent.y0, extent.y1) == (np.min(tensions[:, 2]), np.max(tensions[:, 2]))
+    smooth, means = (axes.lines[k].get_ydata() for k in (1, 2))
+    np.testing.assert_array_equal(smooth, tensions[:, 1])
+    assert np.std(means) < 0.6 * np.std(tensions[:, 2])
+    assert axes.get_legend().get_texts()[2].get_text() == "C3"

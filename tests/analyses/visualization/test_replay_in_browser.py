@@ -10,7 +10,7 @@ from cdpr_drake.analyses.visualization.shown_things import ShownThing, ShownView
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.palette import CAMERA, SLACK, TENSIONS, rgb
+from cdpr_drake.palette import CAMERA, SLACK, TENSIONS, nth_look, rgb
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.workspaces.volume import surface_quads, triangles
@@ -74,20 +74,23 @@ def shown_tensions(browser):
     )
 
 
-def name_colors(browser):
-    """Colours below the names of the cables in the scene."""
+def colors_of(browser, cells, side):
+    """Colours of borders, in the order of the cables."""
     return browser.execute_script(
-        "return [...document.querySelectorAll('.cdpr-name')]"
-        ".map((name) => getComputedStyle(name).borderBottomColor)"
+        f"return [...document.querySelectorAll('{cells}')]"
+        f".map((cell) => getComputedStyle(cell).border{side}Color)"
     )
+
+
+def css(color):
+    return f"rgb({', '.join(f'{255.0 * channel:.0f}' for channel in rgb(color))})"
 
 
 def scene_color(log, row, cable):
     """Of a cable in the scene: red if it is slack, else by its tension."""
     tension, most = log["tensions"][row, cable], np.max(log["tensions"])
     level = min(int(len(TENSIONS) * tension / most), len(TENSIONS) - 1)
-    channels = rgb(SLACK if tension <= 0.0 else TENSIONS[level])
-    return f"rgb({', '.join(f'{255.0 * channel:.0f}' for channel in channels)})"
+    return css(SLACK if tension <= 0.0 else TENSIONS[level])
 
 
 def press(browser, *keys):
@@ -130,7 +133,11 @@ def test_scrubbing_shows_the_time_and_tensions_of_the_log(browser, run):
         assert platform_x(browser) == pytest.approx(log["X_WP"][row, 4], abs=2e-4)
         image = browser.find_element("id", "cdpr-image")
         assert image.get_attribute("data-found") == str(int(log["found"][row, 0]))
-        assert name_colors(browser) == [scene_color(log, row, k) for k in range(8)]
+        colors = colors_of(browser, ".cdpr-value b", "Right")
+        assert colors == [scene_color(log, row, k) for k in range(8)]
+        # A name in the scene has the colour of its curve, whatever its tension is.
+        names = colors_of(browser, ".cdpr-name", "Bottom")
+        assert names == [css(nth_look(k).color) for k in range(8)]
     scrub(browser, 1.4)
     slack = browser.find_elements("css selector", ".cdpr-value.cdpr-slack")
     assert [cell.text.split()[:2] for cell in slack] == [["C3", "slack"]]

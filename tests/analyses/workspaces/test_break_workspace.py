@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation.break_survival import BreakRequest, breaks_at
+from cdpr_drake.analyses.workspaces.break_survival import BreakRequest, breaks_at
 from cdpr_drake.analyses.workspaces.workspace_figures import breaks_figure, planes_figure
 from cdpr_drake.errors import StoppedError
 from cdpr_drake.models.robot_loader import load_robot

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import CameraFault, load_camera
@@ -242,13 +242,13 @@ LOOP = ("camera.kind=projected", "integration.engine=compiled")
 @pytest.mark.parametrize("name", ["acrobot_pbvs", "acrobot_ibvs", "acrobot_circles"])
 def test_a_loop_without_a_diagram_has_the_numbers_of_its_diagram(name):
     logs = [
-        run_scenario(
+        ServoRun(
             load_scenario(name, [
                 *LOOP, f"integration.loop={loop}", "duration=0.4", "camera.latency_frames=1",
                 f"camera.distortion={BARREL_KEYS}", "perturbations.camera_model=astra",
                 "perturbations.image_bias=[1, -2]",
             ])
-        ).log
+        ).simulate().log
         for loop in ("diagram", "compiled")
     ]  # fmt: skip
     for key, values in logs[0].items():
@@ -263,10 +263,12 @@ def test_a_servo_ends_with_a_known_lens_where_it_does_without(name):
     for lens in ([], [f"camera.distortion={BARREL_KEYS}"],
                  [f"camera.distortion={BARREL_KEYS}",
                   "perturbations.camera_distortion={kind: none}"]):  # fmt: skip
-        result = run_scenario(load_scenario(name, [*LOOP, "integration.loop=compiled", *lens]))
+        result = ServoRun(
+            load_scenario(name, [*LOOP, "integration.loop=compiled", *lens])
+        ).simulate()
         X_WP = result.log["X_WP"][-1]
         ends.append(float(np.linalg.norm(
-            X_WP[4:] - result.servo.desired_platform_pose().translation()
+            X_WP[4:] - result.built.desired_platform_pose().translation()
         )))  # fmt: skip
     ideal, known, ignored = ends
     assert known < LENS_COST * ideal

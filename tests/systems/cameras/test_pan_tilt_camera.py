@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.start_checks import check_start
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.checks import check_start
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -22,13 +21,13 @@ def test_loops_leave_it_to_a_diagram():
 
 @pytest.fixture(scope="module")
 def run():
-    return run_scenario(load_scenario("acrobot_pan_tilt", [COMPILED]))
+    return ServoRun(load_scenario("acrobot_pan_tilt", [COMPILED])).simulate()
 
 
 def test_it_finds_the_tag_and_keeps_it(run):
     """From a start where the fixed camera sees nothing."""
     assert run.outcome == Outcome.CONVERGED
-    told = summarize(run)["pan_tilt"]
+    told = run.as_dict()["pan_tilt"]
     assert told["first_seen_s"] > 0.1
     assert told["unseen_after_s"] == 0.0
     assert told["off_center_px"]["end"] < 5.0
@@ -40,7 +39,7 @@ def test_it_finds_the_tag_and_keeps_it(run):
 
 def test_the_steady_view_is_that_of_the_mounting(run):
     """Marks and pose as if the camera were fixed, to what pixels and encoders leave."""
-    log, servo = run.log, run.servo
+    log, servo = run.log, run.built
     row = len(log["time"]) - 40
     assert log["found"][row] == 1.0
     seen = pose_from_row(log["X_CO_measured"][row])
@@ -53,9 +52,9 @@ def test_the_steady_view_is_that_of_the_mounting(run):
 
 
 def test_the_fixed_camera_sees_nothing():
-    fixed = run_scenario(
+    fixed = ServoRun(
         load_scenario("acrobot_pan_tilt", [COMPILED, "camera.pan_tilt=null", "duration=1.0"])
-    )
+    ).simulate()
     assert not np.any(fixed.log["found"])
 
 
@@ -69,7 +68,7 @@ def test_a_start_that_no_angles_show_is_refused():
 
 def test_a_rendered_camera_turns_too():
     """Few images: it sees the tag turned, at angles it starts from."""
-    seen = run_scenario(
+    seen = ServoRun(
         load_scenario(
             "acrobot_pan_tilt",
             [
@@ -78,6 +77,6 @@ def test_a_rendered_camera_turns_too():
                 "controller.rate=10",
             ],
         )
-    )  # fmt: skip
+    ).simulate()  # fmt: skip
     assert seen.log["turned_found"][-1] == 1.0
     assert seen.log["found"][-1] == 1.0

@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import PortDataType
 from pydrake.systems.sensors import ImageRgba8U
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.servoing.pose_features import seen_pose_error
 from cdpr_drake.servoing.servo_task import CameraMounting
@@ -395,8 +395,8 @@ def test_a_texture_is_found_once_by_features_and_then_followed(latency, bias):
 def test_a_servo_sees_a_texture_in_rendered_images(region):
     """Where the true platform's camera has it, row by row."""
     scenario = load_scenario("acrobot_pbvs_textured", [*CHANGES, f"camera.region={region}"])
-    run = run_scenario(scenario)
-    log, servo = run.log, run.servo
+    run = ServoRun(scenario).simulate()
+    log, servo = run.log, run.built
     seen = np.flatnonzero(log["found"][:, 0])
     assert len(seen) >= len(log["time"]) - 1
     assert log["quality"][seen[0], -1] == 0.0

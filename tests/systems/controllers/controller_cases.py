@@ -9,8 +9,8 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -31,7 +31,7 @@ def in_plant(name):
 
 
 def servo_run(name, *changes):
-    return run_scenario(load_scenario(name, [PROJECTED, *changes]))
+    return ServoRun(load_scenario(name, [PROJECTED, *changes])).simulate()
 
 
 def compiled_run(name, *changes):
@@ -39,7 +39,7 @@ def compiled_run(name, *changes):
 
 
 def tension_run(name, *changes):
-    return run_tension_scenario(load_scenario(name, changes))
+    return TensionRun(load_scenario(name, changes)).simulate()
 
 
 def ports(block):

@@ -159,9 +159,9 @@ def test_a_biased_image_is_servoed_to_the_wrong_place():
     """4 px at a focal length of some 860 px and 9 cm: 0.4 mm beside."""
     result = compiled_run("acrobot_pbvs", "perturbations.image_bias=[4, 0]")
     end = pose_from_row(result.log["X_WP"][-1])
-    X_CO = result.servo.X_CO(end, float(result.log["time"][-1]))
+    X_CO = result.built.X_CO(end, float(result.log["time"][-1]))
     off, wanted = (
-        result.servo.pinhole.project(X.translation()[:, np.newaxis])[:, 0]
-        for X in (X_CO, result.servo.X_CdO)
+        result.built.pinhole.project(X.translation()[:, np.newaxis])[:, 0]
+        for X in (X_CO, result.built.X_CdO)
     )
     np.testing.assert_allclose(off - wanted, [-4.0, 0.0], atol=1.5)

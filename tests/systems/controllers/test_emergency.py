@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.primitives import ConstantValueSource
 from scipy.optimize import lsq_linear
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.estimation.break_detection import BreakRule
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
@@ -126,7 +126,7 @@ CHEAP = ["duration=0.6", "integration.engine=compiled", "log_rate=500"]
 
 
 def run(*changes):
-    return run_scenario(load_scenario(SCENARIO, [*CHEAP, *changes])).log
+    return ServoRun(load_scenario(SCENARIO, [*CHEAP, *changes])).simulate().log
 
 
 def breaks(cable):

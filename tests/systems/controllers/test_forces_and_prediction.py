@@ -8,11 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from scipy.optimize import curve_fit
 
-from cdpr_drake.analyses.simulation.tension_control_run import (
-    run_tension_scenario,
-    summarize_tension_run,
-    tension_pictures,
-)
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.control.force_laws import port_energy
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.geometry.cable_paths import cable_jacobian
@@ -90,7 +86,7 @@ def test_a_force_of_5_n_is_held_on_a_table_of_another_stiffness(wrong):
         HELD, f"force_control.contact_stiffness={wrong * true}", "trajectory.pause=1",
         "trajectory.stretches=[{pose: {position: [0.0955, 0.0, 0.2]}, duration: 2}]", "duration=3",
     )  # fmt: skip
-    forces, log = summarize_tension_run(result)["forces"], result.log
+    forces, log = result.as_dict()["forces"], result.log
     assert forces["held_from_s"] < 1.0
     assert forces["held_rms_n"] < 0.3
     assert np.all(log["contact_force"][-100:, 0] > 4.0)
@@ -98,7 +94,7 @@ def test_a_force_of_5_n_is_held_on_a_table_of_another_stiffness(wrong):
     assert np.max(np.abs(log["X_WP"][:, 1:4])) < 0.01  # and turns by less than a degree
     assert np.min(log["cable_clearance"]) > 0.0  # the table is below the lower anchor points
     if wrong < 1.0:
-        assert "forces.png" in tension_pictures(result, ("png",))
+        assert "forces" in result.figures()
 
 
 def test_a_platform_that_is_led_by_hand_goes_where_it_is_led_and_stays():
@@ -143,7 +139,7 @@ def test_the_port_of_an_impedance_takes_in_energy_at_each_random_push():
         f"log_rate={rate}", f"duration={spacing * count}", "disturbances=null",
     ])  # fmt: skip
     pushed_scenario = replace(scenario, disturbances=DisturbanceSettings(pushes=pushes, rate=rate))
-    log = run_tension_scenario(pushed_scenario).log
+    log = TensionRun(pushed_scenario).simulate().log
     assert np.all(log["feasible"][1:] == 1.0)
     energy = port_energy(log["X_WP"], log["applied_wrench"])
     rows = np.append(np.round(spacing * rate * np.arange(count)).astype(int), len(energy) - 1)

@@ -3,7 +3,7 @@
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.workspaces.stability import assess_stability
 from cdpr_drake.control.force_balance import FORCE
 from cdpr_drake.errors import PlanningError, ScenarioError, StabilityError, TensionProblemError
@@ -134,7 +134,7 @@ def test_a_scenario_without_sense_is_refused(name, changes, words):
 
 
 def planar_run(*changes):
-    return run_tension_scenario(load_scenario("planar_computed_torque", changes))
+    return TensionRun(load_scenario("planar_computed_torque", changes)).simulate()
 
 
 def horizon_of_one_step():

@@ -6,15 +6,7 @@ Most go by the compiled loop, whose runs are those of the diagram (tests of `loo
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.run_figures import error_figure
-from cdpr_drake.analyses.simulation.run_stability import stability_along
-from cdpr_drake.analyses.simulation.run_summary import (
-    camera_path,
-    final_errors,
-    image_path,
-    summarize,
-)
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.runs.stability import stability_along
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.geometry.straight_cables import cable_lengths
@@ -36,7 +28,7 @@ nobody foresees."""
 
 def is_at_goal(result, robot):
     assert result.outcome == Outcome.CONVERGED
-    distance, angle = final_errors(result)
+    distance, angle = result.end_error()
     assert distance < LIMITS[robot][0]
     assert angle < LIMITS[robot][1]
 
@@ -47,11 +39,11 @@ def test_every_scheme_reaches_its_goal(robot, scheme):
     run = servo_run if (robot, scheme) == ("acrobot", "ibvs") else compiled_run
     result = run(f"{robot}_{scheme}", "log_rate=25")
     is_at_goal(result, robot)
-    names = result.servo.feature_names
+    names = result.built.feature_names
     assert result.log["error"].shape[1] == len(names)
-    assert summarize(result)["controller"] == result.servo.scenario.controller.scheme
+    assert result.as_dict()["controller"] == result.built.scenario.controller.scheme
     if robot == "acrobot":
-        shown = sum(len(axes.get_lines()) for axes in error_figure(result).axes[:-2])
+        shown = sum(len(axes.get_lines()) for axes in result.plot().axes[:-2])
         assert shown >= len(names)
 
 
@@ -61,8 +53,8 @@ def test_every_scheme_reaches_its_goal(robot, scheme):
 )
 def test_paths_without_noise_are_straight_where_the_thesis_says(scheme, image, space):
     result = compiled_run(f"acrobot_{scheme}", "camera.pixel_noise=0", "log_rate=25")
-    _, path, line = image_path(result)
-    track, camera_line = camera_path(result)
+    _, path, line = result.image_path
+    track, camera_line = (result.camera_path, result.camera_line)
     pixels = np.max(distances_from_line(path, *line)) / THESIS_PIXEL
     metres = np.max(distances_from_line(track, *camera_line))
     assert (pixels < 1.0) == image
@@ -75,9 +67,9 @@ def test_a_partition_and_a_switch_reach_their_goal(name):
     result = compiled_run(name, "log_rate=25")
     robot, _, scheme = name.partition("_")
     is_at_goal(result, robot)
-    summary = summarize(result)
+    summary = result.as_dict()
     assert summary["controller"] == scheme
-    assert error_figure(result) is not None
+    result.plot()
     if scheme == "switching":
         mode = result.log["servo_mode"]
         assert summary["servo_switches"] == mode[-1, 1]
@@ -106,7 +98,7 @@ def test_a_moving_tag_is_followed_at_velocity_over_gain_or_without_error(
     result = compiled_run("acrobot_moving_tag", *overrides, *moving)
     late = result.log["time"] > 6.0
     rows = zip(result.log["X_WP"][late], result.log["time"][late], strict=True)
-    errors = [result.servo.seen_error(pose_from_row(row), time)[0] for row, time in rows]
+    errors = [result.built.seen_error(pose_from_row(row), time)[0] for row, time in rows]
     assert np.mean(errors) == pytest.approx(steady, abs=3e-4)  # noise of 0.1 px leaves 0.2 mm
 
 
@@ -115,7 +107,7 @@ def test_a_ring_that_goes_in_circles_is_followed_and_the_yaw_kept():
     late = np.flatnonzero(result.log["time"] > 4.0)[::25]
     for row, time in zip(result.log["X_WP"][late], result.log["time"][late], strict=True):
         X_WP = pose_from_row(row)
-        distance, angle = result.servo.seen_error(X_WP, time)
+        distance, angle = result.built.seen_error(X_WP, time)
         assert distance < 2e-3
         assert angle < np.radians(0.5)
         R = X_WP.rotation().matrix()
@@ -125,7 +117,7 @@ def test_a_ring_that_goes_in_circles_is_followed_and_the_yaw_kept():
 def test_a_camera_in_the_world_moves_the_tag_on_the_platform():
     result = compiled_run("acrobot_eye_to_hand")
     assert result.outcome == Outcome.CONVERGED
-    assert final_errors(result)[0] < 8e-3  # 0.1 px of 55 px, 1.2 m away
+    assert result.end_error()[0] < 8e-3  # 0.1 px of 55 px, 1.2 m away
 
 
 def test_a_trajectory_is_tracked_at_its_pace():
@@ -169,7 +161,7 @@ def test_images_may_be_late_by_less_than_a_quarter_of_a_swing(estimator):
             "acrobot_pbvs", "stop.hold=100", f"camera.latency_frames={frames}",
             f"estimator.kind={estimator}", "duration=15", "log_rate=25",
         )  # fmt: skip
-        scenario, log = result.servo.scenario, result.log
+        scenario, log = result.built.scenario, result.log
         assert scenario.controller.lambda_0 == GAIN
         assert (GAIN * frames / scenario.camera.rate < np.pi / 2.0) == settles
         late = log["time"] > 10.0
@@ -195,7 +187,7 @@ def test_an_open_loop_with_an_exact_model_arrives(exact):
     assert exact.outcome == Outcome.COMPLETED
     assert exact.sim_time == pytest.approx(4.5, abs=0.1)  # the plan, and the time to hold
     final = pose_from_row(exact.log["X_WP"][-1])
-    distance, angle = pose_error(final, exact.servo.desired_platform_pose())
+    distance, angle = pose_error(final, exact.built.desired_platform_pose())
     assert distance < HOLD
     assert angle < HOLD / 0.05
 
@@ -203,18 +195,18 @@ def test_an_open_loop_with_an_exact_model_arrives(exact):
 def test_an_open_loop_stays_on_its_plan_but_for_what_is_held(exact):
     distance, _ = pose_rows_distance(exact.log["X_WP"], exact.log["X_WP_planned"])
     assert np.max(distance) < 2.0 * LAG
-    summary = summarize(exact)
+    summary = exact.as_dict()
     assert summary["controller"] == "open_loop"
     assert summary["plan_deviation_m"]["max"] == pytest.approx(np.max(distance))
     assert summary["plan_deviation_m"]["mean"] < LAG
-    facts = dict(SCENARIO_KINDS["visual_servo"].facts(summary))
+    facts = dict(exact.facts(summary))
     assert facts["from the plan"].endswith("deg")
     assert "from the straight line" not in facts
 
 
 def test_lengths_change_by_those_of_the_plan(exact):
     """The integral of J V along the plan is the difference of the lengths at its ends."""
-    servo, l0 = exact.servo, exact.log["unstrained_lengths"]
+    servo, l0 = exact.built, exact.log["unstrained_lengths"]
     points = servo.robot.exit_points(), servo.robot.anchor_points()
     start, end = servo.scenario.initial_pose.transform(), servo.desired_platform_pose()
     wanted = cable_lengths(end, *points) - cable_lengths(start, *points)
@@ -234,14 +226,14 @@ def test_a_wrong_model_leaves_the_plan_beside_the_goal_where_servoing_arrives():
     wrong = ["perturbations.exit_points=0.01", "perturbations.anchor_points=0.01"]
     blind, looking = (compiled_run("acrobot_pbvs", *more, *wrong) for more in ([PLAN], []))
     assert looking.outcome == Outcome.CONVERGED
-    assert summarize(blind)["final_position_error_m"] > 3e-3
-    assert summarize(looking)["final_position_error_m"] < 0.3e-3
+    assert blind.as_dict()["final_position_error_m"] > 3e-3
+    assert looking.as_dict()["final_position_error_m"] < 0.3e-3
 
 
 def test_a_wrong_start_shifts_the_whole_way():
     blind = compiled_run("acrobot_pbvs", PLAN, "perturbations.initial_pose_shift.distance=0.02")
     final = pose_from_row(blind.log["X_WP"][-1])
-    assert pose_error(final, blind.servo.desired_platform_pose())[0] > 0.01
+    assert pose_error(final, blind.built.desired_platform_pose())[0] > 0.01
 
 
 def test_an_open_loop_passes_its_waypoints_and_returns():

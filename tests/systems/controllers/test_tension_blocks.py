@@ -15,10 +15,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import MatrixGain
 
-from cdpr_drake.analyses.simulation.tension_control_run import (
-    run_tension_scenario,
-    summarize_tension_run,
-)
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.control.force_balance import FORCE, force_problem
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.errors import TensionProblemError
@@ -343,11 +340,11 @@ def own_method():
 
 def run(method, seconds, engine="plant"):
     loaded = load_scenario("acrobot_computed_torque")
-    return run_tension_scenario(replace(
+    return TensionRun(replace(
         loaded, duration=seconds, expected=None,
         distribution=replace(loaded.distribution, method=method),
         integration=replace(loaded.integration, engine=engine),
-    ))  # fmt: skip
+    )).simulate()  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -357,7 +354,7 @@ def test_a_loop_of_1_khz_misses_no_step_of_an_own_program(terms, seconds, own_me
     """Tensions of the middle and the end are those of the program there by itself."""
     method = own_method(terms)
     done = run(terms, seconds)
-    summary, log = summarize_tension_run(done), done.log
+    summary, log = done.as_dict(), done.log
     counts = summary["program_steps"]
     assert summary["infeasible_steps"] == 0
     assert counts["missed_steps"] == 0
@@ -371,8 +368,8 @@ def test_a_loop_of_1_khz_misses_no_step_of_an_own_program(terms, seconds, own_me
         assert np.max(np.abs(t @ PAIRS.T)) <= BOUND + SOLVER
         plain = run("quadratic_program", seconds)
         assert np.max(np.abs(plain.log["tensions"][1:] @ PAIRS.T)) > BOUND
-        assert "program_steps" not in summarize_tension_run(plain)  # kernels tell no time
-    robot = done.control.robot
+        assert "program_steps" not in plain.as_dict()  # kernels tell no time
+    robot = done.built.robot
     cables = done.scenario.believed_cables(robot)
     for k in (len(t) // 3, len(t) - 1):
         X = pose_from_row(log["X_WP"][k + 1])
@@ -388,13 +385,13 @@ def test_the_compiled_loop_takes_an_own_program_too(own_method):
     plant, compiled = (run("preference", 0.2, engine) for engine in ("plant", "compiled"))
     assert compiled.loop != plant.loop
     for done in (plant, compiled):
-        assert summarize_tension_run(done)["infeasible_steps"] == 0
+        assert done.as_dict()["infeasible_steps"] == 0
     np.testing.assert_allclose(plant.log["tensions"][-1], compiled.log["tensions"][-1], atol=0.05)
 
 
 def test_a_program_that_excludes_all_tensions_is_held_and_counted(own_method):
     method = own_method("impossible")
-    summary = summarize_tension_run(run("impossible", 0.01))
+    summary = run("impossible", 0.01).as_dict()
     assert summary["infeasible_steps"] == summary["program_steps"]["missed_steps"] >= 10
     assert method.step_times.missed >= 10
 

@@ -4,7 +4,7 @@ import copy
 
 import yaml
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -33,7 +33,7 @@ PLATFORM_TAG = (
 
 
 def servo_run(name, *changes):
-    return run_scenario(load_scenario(name, [PROJECTED, *changes]))
+    return ServoRun(load_scenario(name, [PROJECTED, *changes])).simulate()
 
 
 def doubled(name="acrobot_small"):

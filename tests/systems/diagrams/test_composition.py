@@ -225,7 +225,7 @@ def test_motors_of_a_doubled_cable_hold_both(mode, tmp_path):
     if mode == "velocity":
         changes.append("torque_control=null")
     run = servo_run("acrobot_torque_servo", *changes)
-    log, radius = run.log, run.servo.robot.drum().radii(9)[0]
+    log, radius = run.log, run.built.robot.drum().radii(9)[0]
     torques = log["applied_torques"]
     np.testing.assert_array_equal(torques[:, 0], torques[:, 8])
     for k, of in ((1, [1]), (0, [0, 8])):
@@ -241,7 +241,7 @@ def test_pulleys_at_the_platform_are_known_to_servo_and_simulation(tmp_path):
     robot = written(tmp_path, robot_content())
     changes = ["cables.pulleys=true", "controller.pulleys=true", "duration=1.5", robot]
     run = servo_run("acrobot_pulleys", *changes)
-    log, cables = run.log, run.servo.robot.cable_set()
+    log, cables = run.log, run.built.robot.cable_set()
     for row in (0, -1):
         paths = cable_paths(pose_from_row(log["X_WP"][row]), cables)
         np.testing.assert_allclose(log["lengths"][row], paths.lengths, atol=1e-12)

@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.simulation.run_stability import run_criterion, stability_along
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.stability import run_criterion, stability_along
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.controllers.correction_laws import (
@@ -22,6 +21,7 @@ from cdpr_drake.systems.controllers.correction_laws import (
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.tension_management import automatic_gain
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
@@ -39,12 +39,12 @@ def load(*changes):
 
 @pytest.fixture(scope="module")
 def with_correction():
-    return run_scenario(load("duration=3", "sensors.tension=ideal"))
+    return ServoRun(load("duration=3", "sensors.tension=ideal")).simulate()
 
 
 @pytest.fixture(scope="module")
 def without():
-    return run_scenario(load("duration=3", "tension_management=null", *LOOP))
+    return ServoRun(load("duration=3", "tension_management=null", *LOOP)).simulate()
 
 
 def first_taut(result, cable):
@@ -78,7 +78,7 @@ def test_the_servo_itself_is_not_changed(with_correction, without):
 
 
 def test_a_summary_counts_taut_cables(with_correction, without):
-    found, other = summarize(with_correction), summarize(without)
+    found, other = with_correction.as_dict(), without.as_dict()
     assert found["taut_cables"] == {"min": 6, "end": 8}
     assert found["underactuated_s"] == 0.0
     assert found["least_stability_margin"] > 0.9
@@ -92,17 +92,17 @@ def test_stability_along_a_run_is_that_at_its_poses(without):
     assert np.all(along.rank == np.minimum(along.taut, 6))  # generic poses
     assert np.all(along.margin[along.rank < 6] == 0.0)
     assert np.all(along.margin[along.rank == 6] > 0.5)
-    assert along.underactuated_time() == pytest.approx(along.unstable_time())
+    assert along.underactuated_time() == pytest.approx(along.numbers()["unstable_s"])
     log, row = without.log, 40
     X, X_hat = (pose_from_row(log[name][row]) for name in ("X_WP", "X_WP_estimated"))
     taut = log["slack"][row] == 0.0
-    again = run_criterion(without.servo).at(X, X_hat, taut, float(log["time"][row]))
+    again = run_criterion(without).at(X, X_hat, taut, float(log["time"][row]))
     assert again == (along.rank[row], along.margin[row])
 
 
 def test_a_perfect_belief_has_the_margin_one():
     servo = build_visual_servo(load("perturbations.slack=null", "cables.pulleys=false"))
-    X_WP, criterion = servo.scenario.initial_pose.transform(), run_criterion(servo)
+    X_WP, criterion = servo.scenario.initial_pose.transform(), criterion_of(servo, False)
     for taut in (np.ones(8, bool), np.arange(8) != 3, np.arange(8) > 1):
         rank, margin = criterion.at(X_WP, X_WP, taut, 0.0)
         assert rank == 6
@@ -123,7 +123,7 @@ KINDS = [
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_runs_and_takes_up_slack(kind):
-    log = run_scenario(load("duration=2.5", ENGINE, f"tension_management={kind}")).log
+    log = ServoRun(load("duration=2.5", ENGINE, f"tension_management={kind}")).simulate().log
     surplus = log["unstrained_lengths"][:, :2] - log["lengths"][:, :2]
     assert np.all(surplus[-1] < 0.5 * surplus[0])
     assert np.all(np.isfinite(log["tension_corrections"]))
@@ -138,7 +138,7 @@ def test_without_a_gain_management_takes_one_that_is_stable(kind):
     def log(more, loop):
         changes = (f"tension_management={{{kind}{more}}}", f"integration.loop={loop}")
         shared = ("duration=3", "perturbations.slack=null", ENGINE)
-        return run_scenario(load(*shared, *changes)).log["tension_corrections"]
+        return ServoRun(load(*shared, *changes)).simulate().log["tension_corrections"]
 
     own, there, published = log("", "compiled"), log("", "diagram"), log(", gain: 0.04", "compiled")
     np.testing.assert_array_equal(own, there)
@@ -162,24 +162,24 @@ def test_an_automatic_gain_is_proportional_to_stiffness_and_to_the_period():
 def test_a_summary_has_the_automatic_gain(loop):
     """Of `tension_gain` at the pose of the start, less by the share that modes ask for."""
     shared = ("duration=0.2", ENGINE, f"integration.loop={loop}")
-    result = run_scenario(load("tension_management={}", *shared))
-    found, scenario = summarize(result)["tension_gain"], result.servo.scenario
+    result = ServoRun(load("tension_management={}", *shared)).simulate()
+    found, scenario = result.as_dict()["tension_gain"], result.built.scenario
     each = np.array(found["per_length_1_per_ns"])
     at_start = each * result.log["lengths"][0]
     np.testing.assert_allclose(found["at_start_m_per_ns"], at_start, rtol=1e-12)
-    cables = scenario.cables.cable_set(result.servo.robot)
+    cables = scenario.cables.cable_set(result.built.robot)
     readings = scenario.sensors.rate("tension")
     delay = 0.0 if readings is None else 1.0 / readings
     shares = each / tension_gain(cables.stiffness, scenario.controller.rate, delay)  # of 1 m
     assert 0.0 < shares[0] <= 1.0
     np.testing.assert_allclose(shares, shares[0], rtol=1e-9)
-    stated = run_scenario(load("tension_management={gain: 0.04}", *shared))
-    assert "tension_gain" not in summarize(stated)
+    stated = ServoRun(load("tension_management={gain: 0.04}", *shared)).simulate()
+    assert "tension_gain" not in stated.as_dict()
 
 
 def test_winches_commanded_by_position_get_the_correction():
     winches = "winches={kind: motor, mode: position}"
-    log = run_scenario(load("duration=1.5", ENGINE, winches, "sensors.tension=ideal")).log
+    log = ServoRun(load("duration=1.5", ENGINE, winches, "sensors.tension=ideal")).simulate().log
     assert np.all(log["unstrained_lengths"][-1, :2] < log["unstrained_lengths"][0, :2] - 0.03)
 
 
@@ -197,7 +197,7 @@ def slack_run(section, *more):
 
 def slack_gone(scenario):
     """When the last cable comes taut [s], and the corrections."""
-    log = run_scenario(scenario).log
+    log = ServoRun(scenario).simulate().log
     slack = np.any(log["surplus_lengths"][:, :2] > TAUT, axis=1)
     assert np.all(log["tension_corrections"] <= 0.0)
     return float(log["time"][np.flatnonzero(slack)[-1]]), log["tension_corrections"]

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.torque_control import loop_warnings
 from tests.systems.diagrams.diagram_cases import ENGINE, PLATFORM_TAG, PROJECTED
@@ -28,7 +27,7 @@ def load(*changes, scenario="acrobot_torque_servo"):
 
 
 def run(*changes):
-    return run_scenario(load(ENGINE, *changes))
+    return ServoRun(load(ENGINE, *changes)).simulate()
 
 
 def section(**more):
@@ -42,7 +41,7 @@ def slack_start():
 
 
 def test_slack_is_wound_up_at_the_winding_speed_and_limits_hold_from_then_on(slack_start):
-    found = summarize(slack_start)["torque_control"]
+    found = slack_start.as_dict()["torque_control"]
     assert found["steps"] == pytest.approx(1200, abs=1)
     assert 0.6 < found["taut_after_s"] < 0.8 / 0.95  # 4 cm at 0.05 m/s, and what the platform does
     assert found["within_limits"]
@@ -61,12 +60,12 @@ def test_slack_is_wound_up_at_the_winding_speed_and_limits_hold_from_then_on(sla
 
 def test_the_last_cable_to_come_taut_stays_above_the_limit_where_its_winch_once_stopped():
     """A run of case IX in which C2 fell to 0.94 N for 9 ms just after it had come taut."""
-    found = summarize(run(
+    found = run(
         "duration=0.8", "seed=4",
         "perturbations.initial_pose_shift={distance: 0.02, angle_deg: 1.5}",
         "perturbations.exit_points=0.002", "perturbations.anchor_points=0.001",
         section(friction_ratio=1.1),
-    ))["torque_control"]  # fmt: skip
+    ).as_dict()["torque_control"]  # fmt: skip
     assert found["taut_after_s"] < 0.76
     assert found["lowest_tension_n"] >= 1.0
     assert found["within_limits"]
@@ -75,12 +74,13 @@ def test_the_last_cable_to_come_taut_stays_above_the_limit_where_its_winch_once_
 def test_excess_is_counted_where_limits_are_too_narrow(slack_start):
     report = slack_start.torque
     upper = float(report.extremes.highest.max()) - 0.5
-    assert replace(report, limits=(1.0, upper)).excess() == pytest.approx(0.5)
+    found = replace(report, limits=(1.0, upper)).numbers(TorqueControl())
+    assert found["largest_excess_n"] == pytest.approx(0.5)
 
 
 def test_motor_torques_are_tensions_by_radius_over_gear(slack_start):
     """In the mean over time, as friction and what accelerates the motors are left out."""
-    log, law = slack_start.log, slack_start.servo.robot.winch_law()
+    log, law = slack_start.log, slack_start.built.robot.winch_law()
     later = log["time"] > 0.9
     rho = law.drum.radius / law.drum.gear_ratio
     pull = (log["friction_torques"] - log["applied_torques"])[later].mean(axis=0) / rho
@@ -88,11 +88,11 @@ def test_motor_torques_are_tensions_by_radius_over_gear(slack_start):
 
 
 def test_a_run_draws_wanted_tensions(slack_start):
-    assert any("tension_loop" in name for name in run_figures(slack_start, ("png",)))
+    assert "tension_loop" in slack_start.figures()
 
 
 def test_both_engines_do_the_same():
-    plant = run_scenario(load("integration.engine=plant", "duration=0.3"))
+    plant = ServoRun(load("integration.engine=plant", "duration=0.3")).simulate()
     short = run("duration=0.3")
     ends = [pose_from_row(result.log["X_WP"][-1]) for result in (short, plant)]
     assert max(pose_error(*ends)) < SAME_ENGINES
@@ -101,7 +101,7 @@ def test_both_engines_do_the_same():
 
 def test_torque_ends_where_velocity_control_ends_with_friction_off_by_30_per_cent():
     result = run(NO_SLACK, NEAR, "duration=4", section(friction_ratio=0.7))
-    found = summarize(result)
+    found = result.as_dict()
     assert found["final_position_error_m"] <= 0.5e-3
     assert np.degrees(found["final_rotation_error_rad"]) <= 0.5
     assert found["torque_control"]["within_limits"]
@@ -129,7 +129,7 @@ def test_a_planned_pose_is_where_the_target_is_seen_as_desired(mode):
     result = run(
         NO_SLACK, "pose_plan={}", "duration=0.5", "camera.pixel_noise=0", *changes, winches
     )
-    log, goal = result.log, result.servo.desired_platform_pose()
+    log, goal = result.log, result.built.desired_platform_pose()
     for row in log["X_WP_goal"][3:]:
         distance, angle = pose_error(pose_from_row(row), goal)
         assert distance < 0.004  # the estimate's

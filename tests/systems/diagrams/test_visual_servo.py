@@ -6,8 +6,8 @@ Goals of every scheme are in tests of `controllers`.
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.run_summary import final_errors
-from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator, run_scenario
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_rows_distance
 from cdpr_drake.systems.diagrams.calibration_findings import calibration_facts, found_calibrations
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -42,7 +42,7 @@ def systems(servo):
 
 def arrives(result, name):
     assert result.outcome == Outcome.CONVERGED
-    distance, angle = final_errors(result)
+    distance, angle = result.end_error()
     assert distance < REACHED[name]
     assert angle < REACHED_ANGLE
 
@@ -81,7 +81,7 @@ def test_the_other_robots_converge(name):
 
 def test_acrobot_converges_and_its_log_tells_the_run(acrobot_run):
     arrives(acrobot_run, "acrobot_pbvs")
-    servo, log = acrobot_run.servo, acrobot_run.log
+    servo, log = acrobot_run.built, acrobot_run.log
     rows = len(log["time"])
     assert {name: values.shape for name, values in log.items()} == {
         "time": (rows,), "X_WP": (rows, 7), "X_WP_estimated": (rows, 7),
@@ -140,7 +140,7 @@ def test_a_servo_converges_with_a_wrong_model_and_late_images(change):
 def test_a_target_out_of_view_ends_the_run():
     result = servo_run("acrobot_pbvs", "target.pose.position=[-0.5, 0.5, 0.0]")
     assert result.outcome == Outcome.TARGET_LOST
-    assert result.sim_time < result.servo.scenario.stop.target_lost + 0.2
+    assert result.sim_time < result.built.scenario.stop.target_lost + 0.2
     assert not np.any(result.log["found"])
     assert not np.any(result.log["cable_velocities"])
 
@@ -166,7 +166,7 @@ and by 25 mm on CAROCA."""
 def look(*overrides, name="acrobot_pbvs", time=STEP):
     servo = built(name, *overrides)
     context = servo.make_context()
-    make_simulator(servo, context).AdvanceTo(time)
+    fixed_step_simulator(servo.diagram, context, "runge_kutta3", servo.max_step).AdvanceTo(time)
     return servo, servo.log.read(context)
 
 
@@ -247,7 +247,7 @@ FUSION = "estimator.sensor_fusion"
 
 def fused_run(*changes):
     shared = [ENGINE, "log_rate=25", "duration=1.0"]
-    return run_scenario(load_scenario("acrobot_fusion", [*shared, *changes])).log
+    return ServoRun(load_scenario("acrobot_fusion", [*shared, *changes])).simulate().log
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["as commanded", "by IMU"])

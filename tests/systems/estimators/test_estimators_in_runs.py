@@ -8,9 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.wrench_observers import OBSERVERS
 from cdpr_drake.geometry.poses import pose_rows_distance
@@ -33,11 +31,11 @@ LOOP = ("camera.kind=projected", "log_rate=25", ENGINE, "integration.loop=compil
 
 
 def run_of(name, *changes):
-    return run_scenario(load_scenario(name, changes))
+    return ServoRun(load_scenario(name, changes)).simulate()
 
 
 def figures(result):
-    return {name.split(".")[0] for name in run_figures(result, ("png",))}
+    return set(result.figures())
 
 
 def estimated(name, *changes):
@@ -132,7 +130,7 @@ def learnt():
 
 
 def test_learnt_points_are_told_with_the_truth_beside_them(learnt):
-    found = summarize(learnt)["adaptation"]
+    found = learnt.as_dict()["adaptation"]
     assert found["largest_error_in_sigmas"] < FIVE_SIGMA
     assert found["doubts"] == []
     assert found["models_believed"] >= 3
@@ -143,7 +141,7 @@ def test_learnt_points_are_told_with_the_truth_beside_them(learnt):
 
 
 def test_the_servo_goes_by_the_believed_points(learnt):
-    believed, controller = learnt.log["believed_points"], learnt.servo.servo.controller
+    believed, controller = learnt.log["believed_points"], learnt.built.servo.controller
     assert np.any(believed[-1] != believed[0])
     rows = controller._cable_rows
     # The last rows of the log: the servo's last step may be older than the last model.
@@ -155,7 +153,7 @@ def test_the_servo_goes_by_the_believed_points(learnt):
 
 def test_a_model_that_the_criterion_rejects_is_counted_and_told():
     result = run_of(ADAPTED, *SHORT, "duration=2", "adaptation.margin=5")
-    found = summarize(result)["adaptation"]
+    found = result.as_dict()["adaptation"]
     assert found["models_believed"] == 0 < found["models_rejected"]
     assert any("rejected by the stability criterion" in words for words in found["doubts"])
     assert np.ptp(result.log["believed_points"], axis=0).max() == 0.0
@@ -171,7 +169,7 @@ def test_points_that_are_only_logged_change_nothing():
 
 
 def test_late_images_are_put_beside_the_lengths_of_their_instant():
-    found = summarize(run_of(ADAPTED, *SHORT, "camera.latency_frames=3"))["adaptation"]
+    found = run_of(ADAPTED, *SHORT, "camera.latency_frames=3").as_dict()["adaptation"]
     assert found["largest_error_in_sigmas"] < FIVE_SIGMA
     assert found["scatter"] < 2.0
 
@@ -179,7 +177,7 @@ def test_late_images_are_put_beside_the_lengths_of_their_instant():
 def test_a_frozen_encoder_is_named():
     freezes = "failures.events=[{kind: sensor_freezes, sensor: encoder, cable: 3, time: 1.0}]"
     result = run_of(ADAPTED, *SHORT, "duration=7", "sensors.log=[encoder]", freezes)
-    doubts = summarize(result)["adaptation"]["doubts"]
+    doubts = result.as_dict()["adaptation"]["doubts"]
     assert any("the length of C4 contradicts" in words for words in doubts)
 
 
@@ -330,7 +328,7 @@ def pushed_run(section):
 
 def test_a_scenario_logs_sums_up_and_draws_a_wrench():
     result, bias = pushed_run("{kind: static, bandwidth: 2}")
-    summary, log = summarize(result)["wrench_estimation"], result.log
+    summary, log = result.as_dict()["wrench_estimation"], result.log
     assert summary["kind"] == "static"
     assert summary["force_rms_n"] < 0.3
     assert summary["samples_without_pose"] == log["wrench_skipped"][-1, 0]

@@ -4,8 +4,7 @@ import pytest
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS, EstimatorKind
@@ -63,7 +62,7 @@ def test_what_only_a_diagram_can_do_is_said(overrides, reason):
     assert chosen.integration.engine == "compiled"
     assert f"in a diagram, as its {reason.removeprefix('its ')}" in words or reason in words
     asked = load_scenario("acrobot_friction", [*overrides, "integration.loop=compiled"])
-    for refuse in (set_loop, run_scenario):
+    for refuse in (set_loop, ServoRun):
         with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but its"):
             refuse(asked)
 
@@ -100,6 +99,6 @@ def test_a_block_of_a_user_s_is_left_to_the_diagram(monkeypatch):
 
 def test_the_summary_names_the_loop():
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.1"])
-    assert summarize(run_scenario(choose_compiled_loop(scenario)))["loop"] == "compiled"
-    summary = summarize(run_scenario(scenario))
+    assert ServoRun(choose_compiled_loop(scenario)).simulate().as_dict()["loop"] == "compiled"
+    summary = ServoRun(scenario).simulate().as_dict()
     assert (summary["engine"], summary["loop"]) == ("plant", "diagram")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.simulation.monte_carlo import run_many, with_seeds
+from cdpr_drake.analyses.runs.seeds import run_many, with_seeds
 from cdpr_drake.errors import DivergedError
 from cdpr_drake.geometry.drake_pose_kernel import agrees
 from cdpr_drake.models.robot_loader import robot_text
@@ -171,7 +171,7 @@ def test_what_python_raises_is_raised():
 @needs_fused_products
 def test_any_number_of_workers_gives_the_same():
     runs = with_seeds(scenario_of("acrobot_pbvs", duration=0.2), range(3))
-    one, two = (run_many(runs, workers, keep_traces=True) for workers in (1, 2))
+    one, two = (run_many(runs, workers, traces=True) for workers in (1, 2))
     for first, second in zip(one.records, two.records, strict=True):
         np.testing.assert_array_equal(first.end, second.end)
         for name, values in first.traces.items():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.systems.loops.loop_state import Clock, next_time
@@ -30,7 +30,7 @@ SENSORS = ("sensors.log=[tension, encoder, tracker]", "sensors.tension=tractel")
 def both(name, *overrides, duration=0.5):
     common = ["camera.kind=projected", "integration.engine=compiled", f"duration={duration}"]
     return tuple(
-        run_scenario(load_scenario(name, [*common, f"integration.loop={loop}", *overrides]))
+        ServoRun(load_scenario(name, [*common, f"integration.loop={loop}", *overrides])).simulate()
         for loop in ("diagram", "compiled")
     )
 

@@ -9,8 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator, SimulatorStatus
 from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch
@@ -158,7 +157,9 @@ def run_with(tmp_path):
         text = robot_file("acrobot_small").read_text()
         path = tmp_path / "acrobot_small.yaml"
         path.write_text(text.replace("cable:\n", f"cable:\n  breaking_load: {load}\n"))
-        return run_scenario(load_scenario("acrobot_pbvs", [*PROJECTED, f"robot={path}", *more]))
+        return ServoRun(
+            load_scenario("acrobot_pbvs", [*PROJECTED, f"robot={path}", *more])
+        ).simulate()
 
     return run
 
@@ -166,29 +167,32 @@ def run_with(tmp_path):
 def test_a_break_is_reported_and_the_run_goes_on(run_with):
     result = run_with(4)
     assert result.outcome == Outcome.TIMEOUT
-    broken = summarize(result)["broken_cables"]
+    broken = result.as_dict()["broken_cables"]
     assert len(broken) >= 1
     assert all(0.0 < entry["time_s"] <= 0.4 and entry["cable"].startswith("C") for entry in broken)
     # Found before or when the log shows it.
     log = result.log
     for i in np.where(np.max(log["tensions"], axis=0) > 4.0)[0]:
         first = log["time"][np.argmax(log["tensions"][:, i] > 4.0)]
-        assert 0.0 <= result.broken[i] <= first + 2 * result.servo.max_step
+        assert 0.0 <= result.broken[i] <= first + 2 * result.built.max_step
 
 
 def test_it_ends_the_run_where_asked_and_strong_cables_do_not_break(run_with):
     result = run_with(4, "stop.broken_cable=true")
     assert result.outcome == Outcome.CABLE_BROKEN
     assert result.sim_time < 0.4
-    (entry, *_) = summarize(result)["broken_cables"]
-    assert entry["time_s"] == pytest.approx(result.sim_time, abs=3 * result.servo.max_step)
+    (entry, *_) = result.as_dict()["broken_cables"]
+    assert entry["time_s"] == pytest.approx(result.sim_time, abs=3 * result.built.max_step)
     strong = run_with(1000, "stop.broken_cable=true", "duration=0.04")
     assert strong.outcome == Outcome.TIMEOUT
-    assert summarize(strong)["broken_cables"] == []
+    assert strong.as_dict()["broken_cables"] == []
 
 
 def test_without_a_breaking_load_nothing_can_be_asked():
-    assert run_scenario(load_scenario("acrobot_pbvs", [*PROJECTED, "duration=0.04"])).broken is None
+    assert (
+        ServoRun(load_scenario("acrobot_pbvs", [*PROJECTED, "duration=0.04"])).simulate().broken
+        is None
+    )
     with pytest.raises(ScenarioError, match=r"stop\.broken_cable: found true; accepted: false"):
         load_scenario("acrobot_pbvs", ["stop.broken_cable=true"])
 

@@ -9,9 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 
 from cdpr_drake import cli
-from cdpr_drake.analyses.simulation.pick_and_place_figures import live_view, shown_things
-from cdpr_drake.analyses.simulation.pick_and_place_summary import phase_spans
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
+from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun, shown_things
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -20,7 +18,6 @@ from cdpr_drake.systems.pick_and_place.pick_and_place_task import Phase
 from tests.messages import printed
 
 NAME = "acrobot_pick_and_place"
-KIND = SCENARIO_KINDS["pick_and_place"]
 
 SHORT = (
     "camera.kind=projected", "initial_pose={position: [-0.12, -0.05, 0.23]}",
@@ -38,12 +35,12 @@ ACCEPTED_DISTANCE, ACCEPTED_ANGLE = 2e-3, float(np.radians(1.0))
 @pytest.fixture(scope="module")
 def run():
     cover = "cover={phase: carry, delay: 0.1, duration: 0.8}"
-    return KIND.run(load_scenario(NAME, [*SHORT, cover]))
+    return PickAndPlaceRun(load_scenario(NAME, [*SHORT, cover])).simulate()
 
 
 @pytest.fixture(scope="module")
-def summary(run, tmp_path_factory):
-    return KIND.data(tmp_path_factory.mktemp("pick"), run)
+def summary(run):
+    return run.as_dict()
 
 
 def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run, summary):
@@ -51,7 +48,7 @@ def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run, sum
     assert summary["set_down_error_m"] < ACCEPTED_DISTANCE
     assert summary["set_down_error_rad"] < ACCEPTED_ANGLE
     assert summary["views"]["hidden_s"] == pytest.approx(0.8, abs=0.05)
-    carried = phase_spans(run.log)[Phase.CARRY]
+    carried = run.spans()[Phase.CARRY]
     hidden = run.log["time"][run.log["hidden"][:, 0] > 0.0]
     assert carried[0] < hidden[0] < hidden[-1] < carried[1]
     seen = run.log["found_goal"][run.log["hidden"][:, 0] > 0.0]
@@ -59,7 +56,7 @@ def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run, sum
 
 
 def test_the_weight_is_on_the_table_then_on_the_platform_then_on_the_table(run):
-    log, spans = run.log, phase_spans(run.log)
+    log, spans = run.log, run.spans()
     load, times = log["load"][:, 0], log["time"]
     assert np.all(load[times < spans[Phase.GRASP][0]] == 0.0)
     carried = load[(times > spans[Phase.CARRY][0]) & (times < spans[Phase.CARRY][1])]
@@ -75,15 +72,14 @@ def test_words_and_numbers_tell_the_phases(run, summary):
     assert list(summary["phases"]) == [phase.word for phase in Phase if phase < Phase.DONE]
     whole = sum(span["duration_s"] for span in summary["phases"].values())
     assert whole == pytest.approx(run.sim_time, abs=0.15)
-    facts = dict(KIND.facts(summary))
+    facts = dict(run.facts(summary))
     assert "mm" in facts["set down"]
     assert "a tag was hidden" in facts["view"]
 
 
 def test_its_replay_shows_box_tags_gripper_plate_and_both_cameras(run, tmp_path):
-    pictures = KIND.pictures(run, False, ("png",))
-    assert {"phases.png", "way.png", "tensions.png", "replay.html"} <= set(pictures)
-    pictures["replay.html"](tmp_path / "replay.html")
+    assert list(run.figures()) == ["phases", "way", "tensions"]
+    run.replay(tmp_path / "replay.html")
     page = (tmp_path / "replay.html").read_text(encoding="utf-8")
     assert "acrobot" in page.lower()
     assert len(page) > 1_000_000  # with a recording in it
@@ -99,22 +95,21 @@ def test_its_replay_shows_box_tags_gripper_plate_and_both_cameras(run, tmp_path)
     above = things["cover"].X_FG.translation() - things["goal_tag"].X_FG.translation()
     assert 0.0 < above[2] < 0.01
     assert np.linalg.norm(above[:2]) < 1e-6
-    pictures["phases.png"](tmp_path / "phases.png")
-    assert (tmp_path / "phases.png").stat().st_size > 10_000
+    run.plot("phases")
 
 
 def test_a_live_view_shows_a_plate_that_lies_over_a_tag_at_times(run):
     """It has moved the box, and looked whether the plate is there, at the end of a step."""
     meshcat, built = open_meshcat(), run.built
     simulator = Simulator(built.diagram, built.make_context())
-    live_view(run.scenario, meshcat)(simulator, built.diagram)
+    run.live(meshcat)(simulator, built.diagram)
     status = simulator.get_monitor()(simulator.get_context())
     assert status.severity() == EventStatus.Succeeded().severity()
     assert meshcat.HasPath("/drake/things/cover")
 
 
 def test_a_box_out_of_reach_is_missed_and_said_so():
-    ended = KIND.run(load_scenario(NAME, [*SHORT, "gripper.reach=1e-6"]))
+    ended = PickAndPlaceRun(load_scenario(NAME, [*SHORT, "gripper.reach=1e-6"])).simulate()
     assert ended.outcome == Outcome.FAILED
     assert "grasp: the box was out of the gripper's reach" in ended.message
     assert "; found " in ended.message

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.simulation.session import RunSession
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.remote.remote_client import RemoteClient
@@ -30,7 +30,7 @@ class Server:
     timeout: float = LONG
     drivers: list[Driver] = field(default_factory=list)
 
-    def run(self, scenario, **options):
+    def run(self, scenario, folder=None, **options):
         """Runs a scenario with whoever comes, and tells him the end."""
         robot = load_robot(scenario.robot)
         service = tension_service(robot, limits=None, method="quadratic_program")
@@ -45,10 +45,8 @@ class Server:
             remote.commander = driver
             self.drivers.append(driver)
 
-        tension = isinstance(scenario, TensionScenario)
-        run = (run_tension_scenario if tension else run_scenario)(
-            scenario, RunSession(connect=connect, **options)
-        )
+        kind = TensionRun if isinstance(scenario, TensionScenario) else ServoRun
+        run = kind(scenario).simulate(folder, Follow(connect=connect, **options))
         self.drivers[-1].end(
             {
                 "outcome": run.outcome.name.lower(),

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.control.task_space import tracking_wrench_at
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row
@@ -59,7 +59,7 @@ def own_control(settings):
 def inside():
     runs = {}
     for engine in ENGINES:
-        runs[engine] = run_tension_scenario(scenario(f"integration.engine={engine}"))
+        runs[engine] = TensionRun(scenario(f"integration.engine={engine}")).simulate()
     return runs
 
 
@@ -73,7 +73,7 @@ def test_tension_control(inside, engine, place):
     assert run.outcome == Outcome.COMPLETED
     assert run.loop == ("diagram" if engine == "plant" else "remote")
     assert_same_log(run, inside[engine])
-    report = run.control.remote.report()
+    report = run.built.remote.report()
     assert report["exchanges"] == (50 if place == "distributor" else 51)  # and the log's last row
     assert report["codec"] == codec
 
@@ -85,9 +85,9 @@ def test_rows_of_the_log_between_control_steps():
     for how in ("integration.engine=compiled", None):
         settings = scenario("integration.engine=compiled", *rates)
         law = own_control(settings)["controller"]
-        look = None if how else (lambda simulator, diagram: None)
+        look = None if how else (lambda *_: None)
         runs.append(driven(settings, law, prepare=look)[0])
-    alone = run_tension_scenario(scenario("integration.engine=compiled", "log_rate=300"))
+    alone = TensionRun(scenario("integration.engine=compiled", "log_rate=300")).simulate()
     assert [run.loop for run in runs] == ["remote", "diagram"]
     for run in runs:
         assert_same_log(run, alone)
@@ -130,7 +130,7 @@ def test_visual_servo(place):
         return {name: decided[name] for name in names}
 
     run, _ = driven(settings, control)
-    alone = run_scenario(servo_scenario())
+    alone = ServoRun(servo_scenario()).simulate()
     assert list(run.log) == list(alone.log)
     for name in run.log:  # a pose that went through a quaternion has lost its last bits
         np.testing.assert_allclose(run.log[name], alone.log[name], rtol=0.0, atol=1e-9)
@@ -144,6 +144,6 @@ def still(place):
 
 def test_a_place_needs_somebody():
     with pytest.raises(ScenarioError, match="cdpr serve"):
-        run_tension_scenario(scenario("remote.place=controller"))
+        TensionRun(scenario("remote.place=controller")).simulate()
     with pytest.raises(ScenarioError, match=r"remote\.place.*servo, twist"):
         servo_scenario("remote.place=controller")

@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import zmq
 
-from cdpr_drake.analyses.simulation.tension_control_run import summarize_tension_run
 from cdpr_drake.errors import BridgeError, ClientEndedError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
@@ -114,7 +113,7 @@ def test_nonsense_ends_the_run_with_what_was_simulated(kind):
     assert words in run.message
     assert run.sim_time == pytest.approx(1e-3 * STEPS)
     assert np.all(run.log["tensions"][1:] == 4.0)
-    summary = summarize_tension_run(run)
+    summary = run.as_dict()
     assert (summary["outcome"], summary["message"]) == ("client_ended", run.message)
     assert summary["remote"]["exchanges"] == STEPS + (kind == "pushing")
     assert isinstance(found[0], bytes)  # who sends nonsense gets a reply
@@ -194,7 +193,7 @@ def test_a_silent_client(pace):
         assert run.sim_time == pytest.approx(1e-3)
     else:
         assert run.sim_time < 60.0
-        assert run.control.remote.report()["held_steps"] > 0
+        assert run.built.remote.report()["held_steps"] > 0
 
 
 def test_stop_by_the_client():
@@ -271,7 +270,7 @@ def test_strangers_are_answered_and_change_nothing():
         run = one.run(settings())
     assert run.outcome == Outcome.COMPLETED, found
     assert found[0]["outcome"] == "completed"
-    assert run.control.remote.report()["services"] == 3
+    assert run.built.remote.report()["services"] == 3
 
 
 def test_nobody_comes():
@@ -347,7 +346,7 @@ def test_in_real_time_a_command_holds_until_the_next():
     assert set(commanded) <= {3.0, 5.0}
     assert np.all(np.diff(commanded) >= 0.0)
     assert np.count_nonzero(commanded == 3.0) > 1
-    report = run.control.remote.report()
+    report = run.built.remote.report()
     assert report["held_steps"] > 0
     assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1
 

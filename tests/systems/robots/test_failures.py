@@ -12,8 +12,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource, LogVectorOutput, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
@@ -283,12 +282,12 @@ def test_a_run_with_late_messages_says_so():
     scenario = load_scenario("acrobot_broken_redistributed", [
         late, "emergency=null", "duration=0.2", "log_rate=500", "integration.engine=compiled",
     ])  # fmt: skip
-    result = run_scenario(scenario)
+    result = ServoRun(scenario).simulate()
     readings, times = result.log["measured_tensions"], result.log["time"]
     held = (times > 0.11) & (times < 0.145)
     assert np.ptp(readings[held], axis=0) == pytest.approx(np.zeros(M))
     assert np.all(np.ptp(readings[times > 0.17], axis=0) > 0.0)
-    events = summarize(result)["failures"]["events"]
+    events = result.as_dict()["failures"]["events"]
     assert events[0]["what"] == "tension: messages are late"
 
 

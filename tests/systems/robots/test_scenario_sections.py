@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.statics.static import solve_static
 from cdpr_drake.control.task_space import TaskGains
 from cdpr_drake.models.robot_loader import load_robot
@@ -119,7 +117,7 @@ def test_commanded_tensions_do_not_hide_a_damping_that_nobody_knows(rule):
 def test_computed_torque_knows_the_damping_of_file_and_scenario(engine, damping):
     changes = ["duration=3.5", f"integration.engine={engine}"]
     scenario = replace(load_scenario("caroca_computed_torque", changes), damping=damping)
-    log = run_tension_scenario(scenario).log
+    log = TensionRun(scenario).simulate().log
     away = np.linalg.norm(log["X_WP"][:, 4:] - log["X_WP_desired"][:, 4:], axis=1)
     assert np.ptp(log["X_WP"][:, 5]) > 0.5
     # 225 N s/m at 0.4 m/s by 150 kg and a gain of 100 1/s^2 would be 6 mm.
@@ -164,7 +162,9 @@ def test_what_overrides_the_file_is_said():
 def test_caroca_as_it_ships_converges_on_taut_cables(seed, pulleys):
     """With straight undamped cables: 45 cable seconds of slack, and a limit cycle over pulleys."""
     items = [QUICK, f"seed={seed}", f"cables.pulleys={pulleys}", "duration=45.0"]
-    summary = summarize(run_scenario(choose_compiled_loop(load_scenario("caroca_pbvs", items))))
+    summary = (
+        ServoRun(choose_compiled_loop(load_scenario("caroca_pbvs", items))).simulate().as_dict()
+    )
     assert summary["outcome"] == "converged"
     assert summary["slack_cable_seconds"] < 1.0
     assert summary["simulated"]["cable_model"] == "catenary"
@@ -173,7 +173,7 @@ def test_caroca_as_it_ships_converges_on_taut_cables(seed, pulleys):
 def test_caroca_without_its_damping_swings_on():
     scenario = load_scenario("caroca_pbvs", [QUICK, "cables.pulleys=true", "duration=45.0"])
     scenario = replace(scenario, damping=DampingSettings(translation=0.0, rotation=0.0))
-    assert summarize(run_scenario(choose_compiled_loop(scenario)))["outcome"] == "timeout"
+    assert ServoRun(choose_compiled_loop(scenario)).simulate().as_dict()["outcome"] == "timeout"
 
 
 def test_winches_are_ideal_unless_a_scenario_says_otherwise():
@@ -186,7 +186,7 @@ def test_winches_are_ideal_unless_a_scenario_says_otherwise():
 
 @pytest.fixture(scope="module")
 def friction_run():
-    return run_scenario(load_scenario("acrobot_friction", [QUICK]))
+    return ServoRun(load_scenario("acrobot_friction", [QUICK])).simulate()
 
 
 def test_with_friction_motors_follow_with_the_delay_of_their_loops_and_arrive(friction_run):
@@ -202,13 +202,10 @@ def test_with_friction_motors_follow_with_the_delay_of_their_loops_and_arrive(fr
 
 
 def test_torques_are_logged_with_their_units(friction_run):
-    cables = [f"C{i}" for i in range(1, 9)]
-    names = column_names(friction_run.log, cables, ["feature"] * 6)
-    assert "applied_torques.C1_nm" in names
-    assert "friction_torques.C8_nm" in names
-    friction = friction_run.servo.robot.winch_law().friction
+    assert {"applied_torques.C1_nm", "friction_torques.C8_nm"} <= set(friction_run.columns())
+    friction = friction_run.built.robot.winch_law().friction
     taken = np.abs(friction_run.log["friction_torques"])
-    fastest = friction_run.servo.robot.winch.rated_motor_speed()
+    fastest = friction_run.built.robot.winch.rated_motor_speed()
     assert np.max(taken) <= friction.static + friction.viscous * fastest
     assert np.max(taken) > friction.coulomb
 
@@ -219,9 +216,9 @@ def test_by_position_lengths_follow_the_integral_of_the_velocities():
         QUICK, "winches.mode=position", "perturbations.slack=[0.01, 0, 0, 0, 0, 0, 0, 0]",
         "integration.engine=compiled",
     ]  # fmt: skip
-    run = run_scenario(load_scenario("acrobot_friction", overrides))
+    run = ServoRun(load_scenario("acrobot_friction", overrides)).simulate()
     assert run.outcome.name == "CONVERGED"
-    log, law = run.log, run.servo.robot.winch_law()
+    log, law = run.log, run.built.robot.winch_law()
     # Velocities are held between control steps, of which the log has every row.
     step = np.diff(log["time"])[:, np.newaxis]
     moved = np.vstack([np.zeros(8), np.cumsum(log["cable_velocities"][:-1] * step, axis=0)])

@@ -11,13 +11,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.analyses.simulation.session import RunSession
+from cdpr_drake.analyses.runs.simulate import KINDS
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop, set_loop, uses_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from tests.systems.scenarios.scenario_titles import TITLES
 
 WHOLE = "CDPR_WHOLE_SCENARIOS" in os.environ
@@ -42,7 +42,7 @@ def projected(name):
 def shortened(name, items):
     """A scenario with a projected target and changes that make it short, or cut after a time."""
     scenario = load_scenario(name, [*projected(name), *items])
-    if SCENARIO_KINDS[scenario.kind].is_servo:
+    if isinstance(scenario, Scenario):
         scenario = choose_compiled_loop(scenario)
     else:
         scenario = set_loop(scenario, repeated=True)[0]
@@ -56,25 +56,25 @@ def shortened(name, items):
 def test_a_scenario_ends_as_its_file_says_and_does_what_its_title_names(name, tmp_path):
     checks, items = TITLES[name]
     shipped = load_scenario(name)
-    kind, expected = SCENARIO_KINDS[shipped.kind], shipped.expected
+    kind, expected = KINDS[shipped.kind], shipped.expected
     assert expected is not None
     if WHOLE:
         scenario = set_loop(shipped)[0]
-        kind.check(scenario)
+        kind(scenario).check()
     else:
         scenario = shortened(name, items)
-        kind.check(shortened(name, ()))
-    result = kind.run(scenario, RunSession(log_folder=tmp_path / "log"))
+        kind(shortened(name, ())).check()
+    result = kind(scenario).simulate(tmp_path)
     outcome = Outcome(result.outcome).name.lower()
     if scenario.duration >= shipped.duration or outcome not in LASTING:
         assert outcome == expected.outcome, result.message
-        distance, angle = kind.end_error(result)
+        distance, angle = result.end_error()
         assert expected.position is None or distance <= expected.position
         assert expected.rotation_deg is None or np.degrees(angle) <= expected.rotation_deg
     run = SimpleNamespace(
-        summary=kind.numbers(result),
-        log={key: np.array(rows) for key, rows in getattr(result, "log", {}).items()},
-        end=kind.end_error(result),
+        summary=result.as_dict(),
+        log={key: np.array(rows) for key, rows in result.log.items()},
+        end=result.end_error(),
         scheme=getattr(getattr(scenario, "controller", None), "scheme", None),
     )
     for check in () if WHOLE else checks:

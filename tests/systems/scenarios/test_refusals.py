@@ -8,8 +8,8 @@ import yaml
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BallRpyJoint, SpatialInertia
 
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.workspaces.stability_defaults import load_bounds
 from cdpr_drake.errors import (
     CdprError,
@@ -180,11 +180,11 @@ OTHERS = {
     "every kind": (lambda: scenario_kind("foo"), "acrobot_computed_torque.*acrobot_pbvs"),
     "missing file": (lambda: load_scenario("/no/a.yaml"), "^/no/a.yaml: there is no such scenario"),
     "no runner of torque": (
-        run_other(run_scenario, "planar_computed_torque"),
-        "found tension_control.*run_tension_scenario",
+        run_other(ServoRun, "planar_computed_torque"),
+        "found tension_control; accepted: visual_servo",
     ),
     "no runner of servos": (
-        run_other(run_tension_scenario, "planar_pbvs"), r"found visual_servo.*run_scenario"
+        run_other(TensionRun, "planar_pbvs"), r"found visual_servo; accepted: tension_control"
     ),
     "schema of servos": (
         lambda: load_scenario("planar_computed_torque", schema=Scenario),

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.simulation.run_summary import summarize
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot, names_mechanism, robot_file
@@ -264,7 +263,7 @@ def test_the_default_keeps_cables_taut_and_one_setting_makes_it_case_study_i():
     plain = load_scenario(DEFAULT_SCENARIO, ["tension_management=null"])
     assert described(plain) == described(load_scenario("acrobot_pbvs"))
     taut, slack = (
-        summarize(run_scenario(load_scenario(name, QUICK)))
+        ServoRun(load_scenario(name, QUICK)).simulate().as_dict()
         for name in (DEFAULT_SCENARIO, "acrobot_pbvs")
     )
     assert taut["outcome"] == slack["outcome"] == "converged"
@@ -281,5 +280,5 @@ def test_its_gain_is_far_from_where_it_is_unstable(gain, converges):
     """Ten times its own; the published gain is for cables that give: with these it lifts the
     platform."""
     section = f"tension_management={{threshold: [0.5], gain: {gain}}}"
-    result = summarize(run_scenario(load_scenario(DEFAULT_SCENARIO, [*QUICK, section])))
+    result = ServoRun(load_scenario(DEFAULT_SCENARIO, [*QUICK, section])).simulate().as_dict()
     assert (result["outcome"] == "converged") == converges

@@ -8,9 +8,8 @@ import yaml
 from pydrake.geometry import Box, Role
 from pydrake.systems.analysis import InitializeParams
 
-from cdpr_drake.analyses.reporting.log_files import column_names
-from cdpr_drake.analyses.simulation.run_figures import run_figures
-from cdpr_drake.analyses.simulation.visual_servo_run import make_simulator, run_scenario
+from cdpr_drake.analyses.runs.engine import fixed_step_simulator
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance, rotation_vector
@@ -33,7 +32,7 @@ TRACTEL = ("sensors.tension=tractel", "sensors.log=[tension]")
 
 
 def run_of(name, *changes):
-    return run_scenario(load_scenario(name, changes))
+    return ServoRun(load_scenario(name, changes)).simulate()
 
 
 def servo_of(name, *changes):
@@ -51,11 +50,10 @@ def looking():
 
 
 def test_all_readings_are_logged_with_their_units(reading, looking):
-    cables = [f"C{i}" for i in range(1, 9)]
-    assert set(column_names(reading.log, cables, ["feature"] * 6)) >= {
+    assert set(reading.columns()) >= {
         "measured_tensions.C1_n", "measured_lengths.C8_m", "X_WP_measured.x_m", "X_WP_metrology.qw",
     }  # fmt: skip
-    assert set(column_names(looking.log, cables, looking.servo.feature_names)) >= {
+    assert set(looking.columns()) >= {
         "scan_front.681_m", "scan_beam.0_m", "specific_force.z_m_s2", "angular_velocity.x_rad_s",
         "imu_biases.wz_rad_s", "depth_row.159_m", "pan_tilt_encoders.tilt_rad",
         "X_WO_odometry.qw", "wheel_distances.right_m",
@@ -175,7 +173,7 @@ def test_a_loop_without_a_diagram_leaves_sensors_of_a_scene_to_a_diagram():
 
 def test_odometry_is_right_at_the_start_and_drifts(looking):
     rows = looking.log["X_WO_odometry"]
-    start = looking.servo.motion.at(0.0).translation()
+    start = looking.built.motion.at(0.0).translation()
     np.testing.assert_allclose(rows[0, 4:], start, atol=1e-12)
     distance, _ = pose_rows_distance(rows[-1:], rows[:1])
     assert distance[0] > 1e-3
@@ -188,12 +186,12 @@ def test_each_sensor_has_its_own_rate(looking):
 
 
 def test_each_sensor_has_a_figure(looking):
-    drawn = run_figures(looking)
-    for name in ("scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"):
-        assert f"{name}.png" in drawn
+    drawn = {"scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"}
+    assert drawn <= set(looking.figures())
     assert looking.depth_image.shape == (120, 160)
-    without = replace(looking, servo=servo_of("acrobot_moving_tag", *SHORT))
-    assert "imu.png" not in run_figures(without)
+    without = ServoRun(load_scenario("acrobot_moving_tag", SHORT))
+    without.log = looking.log
+    assert "imu" not in without.figures()
 
 
 def test_a_beam_on_the_head_ends_where_the_head_says():
@@ -288,14 +286,14 @@ def test_a_run_that_is_continued_reads_the_same():
     """Biases, odometry and the head are state; all that is random goes by the sample's number."""
     servo = servo_of(LOOKING, *NO_DEPTH, "duration=0.2")
     context = servo.make_context()
-    simulator = make_simulator(servo, context)
+    simulator = fixed_step_simulator(servo.diagram, context, "runge_kutta3", servo.max_step)
     simulator.AdvanceTo(0.1)
     assert has_arrays_only(context)
     kept = {name: values.copy() for name, values in state_arrays(context).items()}
     simulator.AdvanceTo(0.2)
     again = servo.make_context()
     restore_state(again, kept)
-    simulator = make_simulator(servo, again)
+    simulator = fixed_step_simulator(servo.diagram, again, "runge_kutta3", servo.max_step)
     params = InitializeParams()
     params.suppress_initialization_events = True
     simulator.Initialize(params)

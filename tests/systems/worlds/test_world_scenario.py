@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from pydrake.geometry import Role
 
-from cdpr_drake.analyses.simulation.scenario_kinds import SCENARIO_KINDS
-from cdpr_drake.analyses.simulation.tension_control_run import run_tension_scenario
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
-from cdpr_drake.analyses.simulation.worlds import world_facts
+from cdpr_drake.analyses.runs.sections import world_facts
+from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.templates import file_schema
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.errors import ScenarioError
@@ -45,7 +44,7 @@ SHORT = (
 
 
 def set_down_with(*overrides):
-    return run_scenario(load_scenario("acrobot_set_down", [*SHORT, *overrides]))
+    return ServoRun(load_scenario("acrobot_set_down", [*SHORT, *overrides])).simulate()
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +74,7 @@ def test_its_tensions_go_to_zero_without_chatter(set_down):
 
 
 def test_clearances_of_the_run_are_those_of_its_poses(set_down):
-    log, measure = set_down.log, set_down.servo.meters.clearances
+    log, measure = set_down.log, set_down.built.meters.clearances
     for k in (0, 100, -1):
         X_WP, time = pose_from_row(log["X_WP"][k]), float(log["time"][k])
         np.testing.assert_array_equal(log["clearance"][k], measure.platform(X_WP, time))
@@ -83,9 +82,8 @@ def test_clearances_of_the_run_are_those_of_its_poses(set_down):
         assert log["clearance"][k, 1] == pytest.approx(X_WP.translation()[2] - TABLE, abs=1e-6)
 
 
-def test_summary_log_and_figures_tell_of_the_world(set_down, tmp_path):
-    kind = SCENARIO_KINDS["visual_servo"]
-    summary = kind.data(tmp_path, set_down)
+def test_summary_log_and_figures_tell_of_the_world(set_down):
+    summary = set_down.as_dict()
     world = summary["world"]
     assert world["bodies"] == ["ground", "table"]
     assert world["least_clearance_m"]["table"] == pytest.approx(-1e-4, abs=2e-4)
@@ -94,13 +92,11 @@ def test_summary_log_and_figures_tell_of_the_world(set_down, tmp_path):
     assert "plant" in world["contact"]["engine"]
     assert summary["engine"] == "plant"
     assert "pass through" in world["cables"]
-    assert dict(kind.facts(summary))["contact"].startswith("from 0.")
-    header = (tmp_path / "log.csv").read_text().partition("\n")[0]
+    assert dict(set_down.facts(summary))["contact"].startswith("from 0.")
+    header = ",".join(set_down.columns())
     assert "clearance.ground_m,clearance.table_m,cable_clearance.ground_m" in header
     assert "contact_force.z_n,contact_count.count" in header
-    pictures = kind.pictures(set_down, False, ("png",))
-    pictures["world.png"](tmp_path / "world.png")
-    assert (tmp_path / "world.png").stat().st_size > 10_000
+    set_down.plot("world")
 
 
 def test_the_first_touch_ends_a_run_that_asks_for_it():
@@ -319,9 +315,9 @@ def test_dynamic_control_measures_clearances_by_both_engines(engine):
         "world={obstacles: [{name: wall, kind: box, size: [0.02, 0.4, 0.4], "
         "pose: {position: [0.3, 0.0, 0.2]}}]}"
     )
-    run = run_tension_scenario(tension_scenario(wall, f"integration.engine={engine}"))
+    run = TensionRun(tension_scenario(wall, f"integration.engine={engine}")).simulate()
     assert run.outcome == Outcome.COMPLETED
-    half = 0.5 * run.control.robot.platform.size[0]
+    half = 0.5 * run.built.robot.platform.size[0]
     np.testing.assert_allclose(run.log["clearance"][:, 0], 0.29 - half, atol=1e-5)
 
 
@@ -330,18 +326,17 @@ def test_dynamic_control_meets_the_ground():
         ground = "world={ground: {height: 0.15}, contact: {}}"
         return tension_scenario(ground, *overrides, height=0.05)
 
-    run = run_tension_scenario(low())
+    run = TensionRun(low()).simulate()
     assert run.outcome == Outcome.COMPLETED
     assert run.log["X_WP"][-1, 6] == pytest.approx(0.15, abs=RESTS)
     assert run.log["contact_count"][-1, 0] > 0.0
-    kind = SCENARIO_KINDS["tension_control"]
-    warning, limits = kind.check(low())
+    warning, limits = TensionRun(low()).check()
     assert "replace tension_bounds" in limits
     assert "integration.max_step: found 0.001; the largest stable one" in warning
-    assert kind.check(low("integration.max_step=1e-4")) == [limits]
-    facts = dict(kind.facts(kind.data.__globals__["summarize_tension_run"](run)))
+    assert TensionRun(low("integration.max_step=1e-4")).check() == [limits]
+    facts = dict(run.facts(run.as_dict()))
     assert "from ground" in facts["least clearance"]
-    assert run_tension_scenario(low("stop.contact=true")).outcome == Outcome.CONTACT
+    assert TensionRun(low("stop.contact=true")).simulate().outcome == Outcome.CONTACT
 
 
 @pytest.mark.parametrize(("gap", "passes"), [(-1e-3, True), (1e-3, False), (None, False)])

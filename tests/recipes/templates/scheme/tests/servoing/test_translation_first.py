@@ -4,7 +4,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.geometry.poses import exponential
 from cdpr_drake.servoing.translation_first import TranslationFirst
 from cdpr_drake.servoing.visual_features import sighting
@@ -34,7 +34,9 @@ def test_the_matrix():
 
 def test_the_path_is_that_of_pbvs():
     other, pbvs = (
-        run_scenario(cdpr.load_scenario("acrobot_pbvs", [*QUICK, f"controller.scheme={scheme}"]))
+        ServoRun(
+            cdpr.load_scenario("acrobot_pbvs", [*QUICK, f"controller.scheme={scheme}"])
+        ).simulate()
         for scheme in ("translation-first", "pbvs")
     )
     np.testing.assert_allclose(other.log["X_WP"], pbvs.log["X_WP"], atol=SAME)

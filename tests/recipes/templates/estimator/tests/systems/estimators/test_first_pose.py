@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.estimators.first_pose import FirstPose
 from tests.systems.estimators.estimator_bench import RATE, EstimatorBench
@@ -24,7 +24,7 @@ def test_it_stays():
 
 
 def test_a_run():
-    believed = run_scenario(cdpr.load_scenario("acrobot_pbvs", QUICK)).log["X_WP_estimated"]
+    believed = ServoRun(cdpr.load_scenario("acrobot_pbvs", QUICK)).simulate().log["X_WP_estimated"]
     np.testing.assert_allclose(believed, np.tile(believed[0], (len(believed), 1)), atol=ROUNDING)
 
 

@@ -4,8 +4,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.reporting.log_files import write_log
-from cdpr_drake.analyses.simulation.visual_servo_run import run_scenario
+from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.systems.sensors.altimeter import Altimeter, AltimeterModel
 
 QUICK = ["camera.kind=projected", "duration=0.2", "sensors.log=[altimeter]"]
@@ -23,9 +22,9 @@ def test_it_is_wrong_by_a_seed():
     np.testing.assert_array_equal(read, [3.0 + errors[3]])
 
 
-def test_a_run_logs_it(tmp_path):
-    log = run_scenario(cdpr.load_scenario("acrobot_pbvs", QUICK)).log
+def test_a_run_logs_it():
+    run = ServoRun(cdpr.load_scenario("acrobot_pbvs", QUICK)).simulate()
+    log = run.log
     heights = log["measured_height"][2:, 0]
     assert np.max(np.abs(heights - log["X_WP"][2:, 6])) < ONE_PERIOD
-    write_log(tmp_path, log, [f"C{i}" for i in range(8)], ["feature"] * 6)
-    assert "measured_height.0" in (tmp_path / "log.csv").read_text()
+    assert "measured_height.0" in run.columns()

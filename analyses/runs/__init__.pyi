@@ -1,0 +1,9 @@
+from .mechanism import MechanismRun as MechanismRun
+from .pick_and_place import PickAndPlaceRun as PickAndPlaceRun
+from .seeds import run_many as run_many
+from .seeds import with_seeds as with_seeds
+from .servo import ServoRun as ServoRun
+from .simulate import KINDS as KINDS
+from .stability import stability_along as stability_along
+from .stability import stability_figure as stability_figure
+from .tension import TensionRun as TensionRun

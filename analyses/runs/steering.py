@@ -1,0 +1,571 @@
+"""A run that another program follows and steers over a connection, such as the studio.
+
+`steered` lets the program at the other end see samples and images of the run, pause it, change its
+speed, stop it, break a cable, or push the platform. The run is looked at between its steps, and
+waits there: its numbers are those of a run that nobody looks at, but for cables and pushes, which
+are entered into the scenario with their times. If the other end does not read, samples and images
+are left out.
+
+Messages are JSON, followed by bytes for an image. The run sends:
+
+======== ==========================================================================================
+kind     data
+======== ==========================================================================================
+begin    scenario, title, robot, cables (names), limits (two tensions [N]), duration [s], period of
+         the log [s], takes (what can be done by hand: break, push)
+sample   t [s], position_error [m], rotation_error [rad], tensions [N], lengths [m], unstrained
+         [m] or null, pose (quaternion w x y z, position [m]), outcome
+image    t [s], then the image as JPEG
+pace     t [s], paused, speed: a factor, or null for as fast as possible; after each change
+event    t [s], words: what was done by hand, or refused: why it was not
+======== ==========================================================================================
+
+It takes messages of the kind `do`, with `what`: pause, go, step (with `seconds`, or null for the
+period of the log), speed (with `factor`, or null), stop, break (with `cable`, its number), push
+(with `force` [N] in W and `seconds`, a half sine). The end of the connection stops the run.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import select
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from time import monotonic
+from typing import Any
+
+import cv2
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, EventStatus
+
+from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError, ScenarioError
+from cdpr_drake.geometry.poses import pose_error, pose_row
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.palette import DESIRED, ESTIMATED, rgb
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
+from cdpr_drake.systems.cameras.region_camera import RegionCamera
+from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
+from cdpr_drake.systems.diagrams.torque_control import tension_limits
+from cdpr_drake.systems.loops.loop_choice import uses_compiled_loop
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
+from cdpr_drake.systems.robots.disturbances import PUSH as PUSHES
+from cdpr_drake.systems.robots.disturbances import Disturbances, Push
+from cdpr_drake.systems.robots.failures import BREAKS, Failure, Failures
+from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+SAMPLE_RATE, IMAGE_RATE = 30.0, 15.0
+"""Samples and images per second at most [Hz]."""
+
+LISTEN_PERIOD, LONGEST_WAIT = 0.02, 0.05
+"""Times between looks at the connection of a run that goes on, and of one that stands [s]."""
+
+SLOWEST_SPEED, FASTEST_SPEED = 0.01, 1000.0
+"""Accepted factors of real time."""
+
+BEHIND = 0.1
+"""A run that is later does not catch up: it goes on at its speed from there [s]."""
+
+LARGEST_MESSAGE = 16 * 2**20
+"""Size of a message or image; larger ones are no messages of a run [byte]."""
+
+BREAK, PUSH = "break", "push"
+
+UNTOUCHED = {
+    BREAK: ("failures", "{events: []}"),
+    PUSH: ("disturbances", "{pushes: [{kind: step, force: [0.0, 0.0, 0.0]}]}"),
+}
+"""By what can be done by hand, the section of a scenario that it needs, and its least content."""
+
+LARGEST_FORCE, LONGEST_PUSH = 1e6, 60.0
+"""Limits of a push [N, s]."""
+
+LARGEST_WIDTH, QUALITY, PAPER = 640, 80, 246
+"""Width of images at most [px], their quality as JPEG, and grey of an image of marks alone."""
+
+
+def steered(follow: Follow, scenario: Any, descriptor: int) -> Follow:
+    """Lets the program at the other end of a socket steer a run.
+
+    Args:
+        follow: Who follows besides.
+        scenario: The scenario of the run.
+        descriptor: The open socket.
+
+    Raises:
+        CdprError: There is no such socket.
+    """
+    try:
+        connection = Connection(descriptor)
+    except (OSError, ValueError) as problem:
+        raise CdprError(
+            f"steered_by: found {descriptor}; accepted: the number of an open socket"
+        ) from problem
+    steering = Steering(scenario, connection, follow.stop)
+    return replace(follow, prepare=steering.prepare, stop=steering.stop, acts=True)
+
+
+def check_steered(scenario: Any) -> None:
+    """Refuses a run without a diagram that could be looked into.
+
+    Raises:
+        ScenarioError: The scenario asks for the compiled loop.
+    """
+    if uses_compiled_loop(scenario):
+        raise ScenarioError(
+            f"{scenario.name}: integration.loop: found compiled, but a loop cannot be looked into; "
+            "accepted: diagram or automatic"
+        )
+
+
+@dataclass(frozen=True)
+class Message:
+    """A message.
+
+    Attributes:
+        kind: See above.
+        data: Numbers and words, for JSON.
+        blob: The bytes that follow; may be empty.
+    """
+
+    kind: str
+    data: dict[str, Any] = field(default_factory=dict)
+    blob: bytes = b""
+
+
+def send(connection: Connection, message: Message) -> None:
+    """Sends a message, in which numbers that are not finite become null.
+
+    Raises:
+        OSError: The other end is closed.
+    """
+    head = {"kind": message.kind, "blob": len(message.blob), **message.data}
+    connection.send_bytes(json.dumps(_finite(head), allow_nan=False).encode())
+    if message.blob:
+        connection.send_bytes(message.blob)
+
+
+def receive(connection: Connection) -> Message:
+    """Waits for the next message.
+
+    Raises:
+        EOFError: The other end is closed.
+        OSError: The connection broke.
+        ValueError: That was no message.
+    """
+    head = load_json(connection.recv_bytes(LARGEST_MESSAGE))
+    if not isinstance(head, dict) or not isinstance(head.get("kind"), str):
+        raise ValueError("found no kind in a message")
+    kind, size = head.pop("kind"), head.pop("blob", 0)
+    blob = connection.recv_bytes(LARGEST_MESSAGE) if size else b""
+    return Message(kind, head, blob)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+class Steering:
+    """The run's end of the connection: it shows the run, and does what the other end asks for."""
+
+    def __init__(
+        self, scenario: Any, connection: Connection, stop: Callable[[], bool] = lambda: False
+    ) -> None:
+        """Sends the message `begin`.
+
+        Args:
+            scenario: The scenario.
+            connection: Its end of the connection.
+            stop: True if the run should stop for another reason.
+        """
+        self._connection, self._stop_of_others = connection, stop
+        self._pace, self._moments = Pace(), Moments(scenario)
+        self._hands, self._period = ByHand(scenario), 1.0 / scenario.log_rate
+        self._sample_due = self._image_due = self._listen_due = 0.0
+        self._reported: tuple[bool, float | None] | None = None
+        self._connected, self._stopped = True, False
+        begin = {**self._moments.header(), "takes": list(self._hands.takes)}
+        self._send(Message("begin", begin), always=True)
+
+    def stop(self) -> bool:
+        """True if the run should stop."""
+        return self._stopped or self._stop_of_others()
+
+    def prepare(self, run: Any, simulator: Simulator, diagram: Diagram) -> None:
+        """Looks at a run from now on, see `Follow.prepare`."""
+        self._hands.prepare(diagram)
+        simulator.set_monitor(lambda context: self._look(diagram, context))
+
+    def _look(self, diagram: Diagram, context: Context) -> EventStatus:
+        now, wall = context.get_time(), monotonic()
+        if wall >= self._listen_due:
+            self._listen(now)
+            self._listen_due = wall + LISTEN_PERIOD
+        if wall >= self._sample_due:
+            self._show(diagram, context, wall)
+        shown = False
+        while (wait := self._pace.wait(now)) > 0.0 and self._connected and not self.stop():
+            if self._pace.paused and not shown:
+                self._report_pace(now)
+                self._image_due = 0.0
+                self._show(diagram, context, monotonic())
+                shown = True
+            if self._poll(min(wait, LONGEST_WAIT)):
+                self._listen(now)
+        self._report_pace(now)
+        return EventStatus.DidNothing()
+
+    def _show(self, diagram: Diagram, context: Context, wall: float) -> None:
+        """Sends a sample, and an image if it is time."""
+        self._sample_due = wall + 1.0 / SAMPLE_RATE
+        self._send(Message("sample", self._moments.sample(diagram, context)))
+        if wall >= self._image_due:
+            jpeg = self._moments.image(diagram, context)
+            if jpeg:
+                self._send(Message("image", {"t": context.get_time()}, jpeg))
+            self._image_due = monotonic() + 1.0 / IMAGE_RATE
+
+    def _report_pace(self, now: float) -> None:
+        state = (self._pace.paused, self._pace.speed)
+        if state != self._reported:
+            self._reported = state
+            data = {"t": now, "paused": state[0], "speed": state[1]}
+            self._send(Message("pace", data), always=True)
+
+    def _send(self, message: Message, always: bool = False) -> None:
+        """Sends a message, unless it would wait for the other end to read."""
+        if not self._connected:
+            return
+        try:
+            room = select.poll()
+            room.register(self._connection.fileno(), select.POLLOUT)
+            if always or room.poll(0):
+                send(self._connection, message)
+        except OSError:
+            self._hang_up()
+
+    def _hang_up(self) -> None:
+        """The other end is gone: the run ends, and keeps what it has."""
+        self._connected = False
+        self._end()
+
+    def _end(self) -> None:
+        self._pace.go()
+        self._pace.go_at(None)
+        self._stopped = True
+
+    def _poll(self, seconds: float) -> bool:
+        try:
+            return self._connection.poll(seconds)
+        except OSError:
+            self._hang_up()
+            return False
+
+    def _listen(self, now: float) -> None:
+        """Does what messages ask for that have arrived."""
+        while self._connected and self._poll(0.0):
+            try:
+                message = receive(self._connection)
+            except (EOFError, OSError):
+                self._hang_up()
+            except ValueError:
+                continue
+            else:
+                if message.kind == "do":
+                    self._do(message.data, now)
+
+    def _do(self, data: dict[str, Any], now: float) -> None:
+        what, pace = data.get("what"), self._pace
+        if what == "pause":
+            pace.pause()
+        elif what == "go":
+            pace.go()
+        elif what == "step":
+            seconds = data.get("seconds")
+            pace.step(now, self._period if seconds is None else max(float(seconds), 0.0))
+        elif what == "speed":
+            factor = data.get("factor")
+            if factor is not None:
+                factor = min(max(float(factor), SLOWEST_SPEED), FASTEST_SPEED)
+            pace.go_at(factor)
+        elif what == "stop":
+            self._end()
+        elif what in (BREAK, PUSH):
+            try:
+                event = self._hands.do(data, now)
+            except ScenarioError as problem:
+                event = {"t": now, "refused": str(problem)}
+            self._send(Message("event", event), always=True)
+
+
+class Pace:
+    """When a run may go on: paused, step by step, or at a factor of real time.
+
+    Attributes:
+        paused: True if it stands.
+        speed: Simulated seconds per second; None: as fast as possible.
+    """
+
+    def __init__(self, speed: float | None = None, clock: Callable[[], float] = monotonic) -> None:
+        """Of a run that goes on; `clock` returns a time that passes [s]."""
+        self.paused, self.speed, self._clock = False, speed, clock
+        self._until = math.inf
+        self._anchor: tuple[float, float] | None = None
+
+    def pause(self) -> None:
+        """Stands still from now on."""
+        self.paused, self._until = True, math.inf
+
+    def go(self) -> None:
+        """Goes on."""
+        self.paused, self._until, self._anchor = False, math.inf, None
+
+    def step(self, now: float, seconds: float) -> None:
+        """Goes on from a simulated time for some simulated seconds, and stands then."""
+        self.go()
+        self._until = now + seconds
+
+    def go_at(self, speed: float | None) -> None:
+        """Changes the speed; a run that stands still does so."""
+        self.speed, self._anchor = speed, None
+
+    def wait(self, now: float) -> float:
+        """Time to wait at a simulated time [s]: 0 to go on, infinite if it stands [s]."""
+        if not self.paused and now >= self._until * (1.0 - 1e-12):
+            self.pause()
+        if self.paused:
+            self._anchor = None
+            return math.inf
+        if self.speed is None:
+            return 0.0
+        wall = self._clock()
+        if self._anchor is None:
+            self._anchor = (wall, now)
+        since, start = self._anchor
+        ahead = since + (now - start) / self.speed - wall
+        if ahead < -BEHIND:
+            self._anchor = (wall, now)
+        return max(ahead, 0.0)
+
+
+class Moments:
+    """Reads samples and images of a run from the exported ports of its diagram, by their names."""
+
+    def __init__(self, scenario: Any) -> None:
+        """For a scenario of any kind that moves a robot."""
+        self._scenario, self._robot = scenario, load_robot(scenario.robot)
+        self._model: ServoModel | None = None
+        if isinstance(scenario, Scenario):
+            self._model = servo_model(scenario, self._robot)
+            self._picture = MarksPicture(self._model)
+
+    def header(self) -> dict[str, Any]:
+        """Data of the message `begin`, but for `takes`."""
+        scenario, robot = self._scenario, self._robot
+        return {
+            "scenario": scenario.name, "title": scenario.title, "robot": robot.name,
+            "cables": [cable.name for cable in robot.cables],
+            "limits": list(shown_limits(scenario, robot)),
+            "duration": scenario.duration, "period": 1.0 / scenario.log_rate,
+        }  # fmt: skip
+
+    def sample(self, diagram: Diagram, context: Context) -> dict[str, Any]:
+        """Data of the message `sample`."""
+
+        def read(name: str) -> Any:
+            return diagram.GetOutputPort(name).Eval(context)
+
+        X_WP, unstrained, outcome = read("X_WP"), None, Outcome.RUNNING
+        if diagram.HasOutputPort("unstrained_lengths"):
+            unstrained = read("unstrained_lengths").tolist()
+        if diagram.HasOutputPort("outcome"):
+            outcome = Outcome(int(read("outcome")[0]))
+        if self._model is not None:
+            distance, angle = self._model.seen_error(X_WP, context.get_time())
+        else:
+            distance, angle = pose_error(X_WP, read("X_WP_desired"))
+        return {
+            "t": context.get_time(),
+            "position_error": float(distance), "rotation_error": float(angle),
+            "tensions": read("tensions").tolist(), "lengths": read("lengths").tolist(),
+            "unstrained": unstrained, "pose": pose_row(X_WP).tolist(),
+            "outcome": outcome.name.lower(),
+        }  # fmt: skip
+
+    def image(self, diagram: Diagram, context: Context) -> bytes:
+        """The camera's image as JPEG, with marks as measured and as desired; empty without one."""
+        if self._model is None:
+            return b""
+        marks = None
+        if diagram.GetOutputPort("found").Eval(context)[0] != 0.0:
+            marks = diagram.GetOutputPort(self._model.target.mark).Eval(context)
+        camera, image = diagram.GetSubsystemByName("camera"), None
+        own = camera.GetMyContextFromRoot(context)
+        if isinstance(camera, RegionCamera):
+            image = camera.picture(own)
+        elif camera.HasOutputPort("color_image"):
+            image = camera.GetOutputPort("color_image").Eval(own).data
+        return self._picture.jpeg(marks, image)
+
+
+def shown_limits(scenario: ScenarioHeader, robot: Robot) -> tuple[float, float]:
+    """Smallest and largest tension [N] that a run is judged by."""
+    if isinstance(scenario, TensionScenario):
+        return robot.tension_limits(scenario.limits())
+    if isinstance(scenario, Scenario) and scenario.winches.mode == "torque":
+        return tension_limits(scenario, robot)
+    return robot.tension_limits()
+
+
+class MarksPicture:
+    """Draws images of the camera of a visual servo, with marks on them."""
+
+    def __init__(self, model: ServoModel) -> None:
+        """For the camera and the target of a visual servo."""
+        target, pinhole = model.target, model.pinhole
+        self._mark, self._scale = target.mark, min(1.0, LARGEST_WIDTH / pinhole.width)
+        self._size = (round(pinhole.width * self._scale), round(pinhole.height * self._scale))
+        no_noise = np.random.default_rng(0)
+        self._desired = target.project(model.X_CdO, pinhole, 0.0, no_noise)
+
+    def jpeg(self, marks: Array | None, image: np.ndarray | None) -> bytes:
+        """An image as JPEG.
+
+        Args:
+            marks: Marks as measured, shape (size,) [px]; None: none.
+            image: What the camera sees, shape (height, width, 3 or 4), red first; None: paper.
+        """
+        if image is None:
+            picture = np.full((self._size[1], self._size[0], 3), PAPER, np.uint8)
+        else:
+            whole = cv2.cvtColor(np.ascontiguousarray(image[:, :, :3]), cv2.COLOR_RGB2BGR)
+            picture = cv2.resize(whole, self._size, interpolation=cv2.INTER_AREA)
+        for shown, look, width in ((marks, ESTIMATED, 3), (self._desired, DESIRED, 1)):
+            if shown is not None:
+                color = tuple(round(255.0 * value) for value in reversed(rgb(look.color)))
+                draw = self._draw_points if self._mark == "corners" else self._draw_ellipses
+                draw(picture, shown, color, width)
+        _, coded = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+        return coded.tobytes()
+
+    def _draw_points(self, picture: np.ndarray, marks: Array, color: Any, width: int) -> None:
+        """Points, and the outlines of tags if there are four points each."""
+        points = self._scale * marks.reshape(-1, 2)
+        for four in points.reshape(-1, 4, 2) if len(points) % 4 == 0 else ():
+            if np.all(np.isfinite(four)):
+                corners = np.round(four).astype(np.int32)
+                cv2.polylines(picture, [corners], True, color, width, cv2.LINE_AA)
+        for u, v in points[np.all(np.isfinite(points), axis=1)]:
+            cv2.circle(picture, (round(float(u)), round(float(v))), 3, color, -1, cv2.LINE_AA)
+
+    def _draw_ellipses(self, picture: np.ndarray, marks: Array, color: Any, width: int) -> None:
+        for ellipse in marks.reshape(-1, ELLIPSE_SIZE):
+            if not np.all(np.isfinite(ellipse)):
+                continue
+            u, v, n20, n11, n02 = ellipse
+            values, vectors = np.linalg.eigh(np.array([[n20, n11], [n11, n02]]))
+            axes = [2.0 * self._scale * float(np.sqrt(value)) for value in np.maximum(values, 0.0)]
+            angle = float(np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0])))
+            center = (round(self._scale * float(u)), round(self._scale * float(v)))
+            size = (round(axes[0]), round(axes[1]))
+            cv2.ellipse(picture, center, size, angle, 0.0, 360.0, color, width, cv2.LINE_AA)
+            cv2.circle(picture, center, 2, color, -1, cv2.LINE_AA)
+
+
+class ByHand:
+    """Breaks cables and pushes the platform of a running diagram.
+
+    What is done is entered into the sections `failures` and `disturbances` of the scenario, with
+    its time, so that the scenario in the results gives the same run again.
+
+    Attributes:
+        takes: What can be done: `BREAK`, `PUSH`, both or none.
+    """
+
+    def __init__(self, scenario: Any) -> None:
+        """For the scenario of which the diagram is built."""
+        failures, disturbances = (
+            getattr(scenario, section, None) for section, _ in UNTOUCHED.values()
+        )
+        # Events at the start fix the times of events in the diagram.
+        accepted = {
+            BREAK: failures is not None and not failures.events, PUSH: disturbances is not None,
+        }  # fmt: skip
+        self.takes = tuple(name for name in accepted if accepted[name])
+        self._cables = [cable.name for cable in load_robot(scenario.robot).cables]
+        self._broken: set[int] = set()
+        self._failures: Failures | None = None
+        self._disturbances: Disturbances | None = None
+
+    def prepare(self, diagram: Diagram) -> None:
+        """Takes the blocks of a diagram that do it."""
+        for system in diagram.GetSystems():
+            if isinstance(system, Failures):
+                self._failures = system
+            elif isinstance(system, Disturbances):
+                self._disturbances = system
+            elif isinstance(system, Diagram):
+                self.prepare(system)
+
+    def do(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
+        """Does it at the next step; returns time and words.
+
+        Args:
+            request: `what` and what belongs to it, see the messages above.
+            now: The simulated time [s].
+
+        Raises:
+            ScenarioError: It cannot be done; one line.
+        """
+        what = request["what"]
+        if what not in self.takes:
+            raise ScenarioError(
+                f"{what}: found it with a scenario without {UNTOUCHED[what][0]}; accepted: "
+                f"{', '.join(self.takes) or 'nothing by hand'}"
+            )
+        return self._break(request, now) if what == BREAK else self._push(request, now)
+
+    def _break(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
+        assert self._failures is not None
+        number, count = request.get("cable"), len(self._cables)
+        if not isinstance(number, int) or not 0 <= number < count or number in self._broken:
+            accepted = ", ".join(str(k) for k in range(count) if k not in self._broken)
+            raise ScenarioError(f"cable: found {number}; accepted: {accepted}")
+        self._broken.add(number)
+        self._failures.add(Failure(kind=BREAKS, time=now, cable=number))
+        return {"t": now, "words": f"{self._cables[number]} breaks", "cable": number}
+
+    def _push(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
+        assert self._disturbances is not None
+        try:
+            force = np.array(request.get("force"), float)
+            seconds = float(request.get("seconds", np.nan))
+        except (TypeError, ValueError):
+            force, seconds = np.full(3, np.nan), np.nan
+        size = float(np.linalg.norm(force)) if force.shape == (3,) else np.nan
+        if not 0.0 < size <= LARGEST_FORCE:
+            raise ScenarioError(
+                f"force: found {str(request.get('force'))[:60]}; accepted: three numbers, together "
+                f"above 0 to {LARGEST_FORCE:g} N"
+            )
+        if not 0.0 < seconds <= LONGEST_PUSH:
+            raise ScenarioError(
+                f"seconds: found {str(request.get('seconds'))[:60]}; accepted: above 0 to "
+                f"{LONGEST_PUSH:g} s"
+            )
+        period = self._disturbances.period
+        start = (math.floor(now / period) + 1) * period  # a period under way is not changed
+        self._disturbances.add(Push(kind=PUSHES, start=start, end=start + seconds, force=force))
+        return {"t": now, "words": f"push of {size:g} N for {seconds:g} s"}

@@ -1,0 +1,84 @@
+"""Plans and fits that end while their figures are drawn are made again."""
+
+import os
+from pathlib import Path
+
+import cv2
+import pytest
+
+from cdpr_drake.analyses.reporting.written_files import DRAWING
+from cdpr_drake.schema.yaml_files import load_yaml
+from tests.cli.commands import ended, refuse
+from tests.cli.test_calibrate_camera import BOARD, LENS, K
+from tests.cli.test_identify import write
+from tests.identification.logs import log
+from tests.vision.boards import board_image, board_poses, make_board
+
+pytestmark = pytest.mark.usefixtures("here")
+
+
+class Ended(BaseException):
+    """What no handler takes, as the end of a process."""
+
+
+def end_at_once(*_):
+    raise Ended
+
+
+PLAN = ("plan", "planar", "--no-track", "--stations", "40", "--out", "plan", "--waypoints")
+
+
+def test_a_plan_that_ends_while_its_figures_are_drawn_is_made_again(here, monkeypatch, capsys):
+    whole = "0,0,0.3;0.02,0,0.3"
+    with monkeypatch.context() as patch:
+        patch.setattr("cdpr_drake.analyses.frame.figures.figure_writers", end_at_once)
+        for _ in range(2):  # and nothing piles up beside it
+            with pytest.raises(Ended):
+                ended(*PLAN, whole)
+            assert os.listdir(here) == ["plan"]
+    assert "holds other results" in refuse(capsys, *PLAN, "0,0,0.3;0.01,0,0.3")
+    assert ended(*PLAN, whole) == 0
+    assert "path.png" in os.listdir("plan")
+    assert "--overwrite" in refuse(capsys, *PLAN, whole)
+
+
+def fitted(folder):
+    """A command that identifies a robot in a log."""
+    write(folder / "log.csv", *log(span=2.0, tension=0.3, place=1e-4, angle=2e-4))
+    return ["identify", "acrobot_large", "log.csv", "--no-pulleys", "--out", "fit"]
+
+
+def seen(folder):
+    """A command that finds a camera in images of a board."""
+    board, names = make_board("charuco"), []
+    for k, pose in enumerate(board_poses(board, 6, 0.45, spread=0.35)):
+        names.append(f"{k}.png")
+        cv2.imwrite(str(folder / names[-1]), board_image(board, K, LENS, (640, 480), pose))
+    return ["calibrate-camera", *names, *BOARD, "--out", "fit"]
+
+
+def told(name):
+    """What a file of the fit says, but for how long it took, and which files there are."""
+    told = load_yaml(Path("fit", name).read_text())
+    return {key: told[key] for key in told.keys() - {"wall_time_s", "files"}}
+
+
+@pytest.mark.parametrize("asked", [fitted, seen])
+def test_a_fit_that_ends_while_its_figures_are_drawn_is_made_again(asked, here, monkeypatch):
+    words = asked(here)
+    with monkeypatch.context() as patch:
+        figures = "cdpr_drake.analyses.frame.figures.write_pictures"
+        patch.setattr(figures, end_at_once)
+        with pytest.raises(Ended):
+            ended(*words)
+    there = sorted(os.listdir("fit"))
+    assert DRAWING in there  # and the numbers, which no figure can cost
+    numbers = {name: told(name) for name in there if name.endswith((".json", ".yaml"))}
+    assert len(numbers) == 3
+    assert ended(*words) == 0
+    made = os.listdir("fit")
+    assert any(name.endswith(".png") for name in made)
+    assert DRAWING not in made
+    assert {name: told(name) for name in numbers} == numbers
+    assert [name for name in os.listdir(".") if name.startswith("fit")] == ["fit"]
+    assert ended(*words) == 2  # what is complete is not touched
