@@ -80,20 +80,6 @@ class LoopLog:
         self._times[self._count] = time
         self._count += 1
 
-    def make_room(self, rows: int) -> tuple[Array, Array]:
-        """Times and rows of all columns, with room for so many more rows, from `rows()` on."""
-        missing = self._count + rows - len(self._times)
-        if missing > 0:
-            more = max(missing, len(self._times))
-            self._times = np.concatenate([self._times, np.empty(more)])
-            self._rows = np.concatenate([self._rows, np.empty((more, self._rows.shape[1]))])
-        return self._times, self._rows
-
-    def take(self, count: int) -> None:
-        """Says that there are so many rows, after others were written into `make_room`."""
-        self._count = count
-        self._shown = [None] * len(self._readers)
-
     def read(self, _: object = None) -> dict[str, Array]:
         """Times "time", shape (n,) [s], and each quantity, shape (n, size)."""
         rows = self._rows[: self._count]

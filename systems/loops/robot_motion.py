@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -36,38 +34,6 @@ from cdpr_drake.winches.motor_kernel import pack_winch, winch_torques
 
 TENSIONS, DRUM_TENSIONS, LENGTHS, SLACK, SURPLUS = range(5)
 """Rows of `RobotMotion.cables`, in the order of `simulation_kernel.model_outputs`."""
-
-
-class MotionArrays(NamedTuple):
-    """What kernels take of a `RobotMotion`; they write into its own arrays.
-
-    Attributes:
-        robot: `robot_addresses` of the robot.
-        reach: The kernel that integrates.
-        outputs: The kernel that says what the cables do.
-        rule: Numbers of the rule for `reach`.
-        present: State, its time and the report, now.
-        command: Commanded cable velocities, shape (m,) [m/s].
-        calm: Rates of the command and the brakes, both zero, shape (2, m).
-        memory: Memory of `reach`.
-        cables: The cables, shape (m, k).
-        room: Work space of `outputs`.
-        limit: Largest speed of ideal winches, shape (1,) [m/s].
-        platform: Numbers of the platform's state.
-    """
-
-    robot: np.ndarray
-    reach: Any
-    outputs: Any
-    rule: Array
-    present: Array
-    command: Array
-    calm: Array
-    memory: Array
-    cables: Array
-    room: Array
-    limit: Array
-    platform: int
 
 
 class RobotMotion:
@@ -147,20 +113,6 @@ class RobotMotion:
     def has_motors(self) -> bool:
         """Whether motors drive the winches."""
         return self._drive.kind == MOTORS
-
-    @property
-    def is_floating(self) -> bool:
-        """Whether the platform is a floating body."""
-        return self._joint.is_floating
-
-    def kernel_arrays(self) -> MotionArrays:
-        """What a kernel needs that goes from event to event; the motion must be kept, and
-        `forget` be told."""
-        return MotionArrays(
-            self._where, self._packed.reach, self._outputs, self._packed.numbers, self._present,
-            self._command, self._calm, self._memory, self._arrays.cables, self._room,
-            np.array([self._arrays.winch[0, 0]]), self._n,
-        )  # fmt: skip
 
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False

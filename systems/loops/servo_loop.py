@@ -37,7 +37,6 @@ from cdpr_drake.systems.loops.parts import (
     checked_sensor,
 )
 from cdpr_drake.systems.loops.robot_motion import LENGTHS, SLACK, SURPLUS, TENSIONS, RobotMotion
-from cdpr_drake.systems.loops.servo_events import ServoEvents, ServoState, python_reason
 from cdpr_drake.systems.monitoring.run_monitor import NOT_YET, Outcome
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -62,7 +61,6 @@ class ServoLoop:
         max_step: Integration step [s].
         time: Time that has been reached [s].
         outcome: How the run ended; RUNNING till then.
-        python_reason: Why it goes from event to event in Python; empty: one kernel does.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -130,8 +128,6 @@ class ServoLoop:
             self._clocks.append(self._correction)
         self._struck: list[Clock] = []
         self.log = LoopLog(self._logged())
-        self._events: ServoEvents | None = None
-        self.python_reason = python_reason(scenario, self.model)
 
     def _connect(self, robot: Robot) -> None:
         """Makes cameras, estimators and sensors, and says who reads what."""
@@ -246,9 +242,6 @@ class ServoLoop:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
-        if not self.python_reason:
-            self._advance_compiled(boundary)
-            return
         while self.time < boundary:
             if self._struck:
                 self._update()
@@ -260,45 +253,6 @@ class ServoLoop:
             if self._judged != Outcome.RUNNING and self._control in self._struck:
                 self.outcome = self._judged
                 return
-
-    def _advance_compiled(self, boundary: float) -> None:
-        if self._events is None:
-            self._events = ServoEvents(
-                self.scenario, self.model, self._servo, self._monitor, self._motion,
-                offsets=self._offsets, log=self.log, state=self._state(),
-            )  # fmt: skip
-        try:
-            self._events.advance_to(boundary)
-        finally:
-            self.time, self.outcome = self._events.time, Outcome(self._events.outcome)
-
-    def _state(self) -> ServoState:
-        clocks = (self._control, self._logging, self._image)
-        return ServoState(
-            np.array([[clock.period, clock.next, clock in self._struck] for clock in clocks]),
-            np.array([self.time, *self._since, float(self._judged), float(self.outcome)]),
-            self._eyes[0].frames(),
-            [estimate.memory for estimate in self._estimates],
-            self._memory,
-            self._outputs,
-        )
-
-    def _settle(self) -> None:
-        """Takes over where the kernel stands."""
-        if self._events is None:
-            return
-        state = self._events.state()
-        clocks = (self._control, self._logging, self._image)
-        for clock, (_, later, _) in zip(clocks, state.clocks, strict=True):
-            clock.next = float(later)
-        strikes = state.clocks[:, 2] != 0.0
-        self._struck = [clock for clock, now in zip(clocks, strikes, strict=True) if now]
-        _, reached, lost, judged, _ = state.run.tolist()
-        self._since, self._judged = (reached, lost), Outcome(int(judged))
-        self._eyes[0].take(state.frames)
-        for estimate, memory in zip(self._estimates, state.estimates, strict=True):
-            estimate.take(memory)
-        self._memory, self._outputs = state.servo, state.outputs
 
     def _update(self) -> None:
         """Lets look and decide whose time has come."""
@@ -331,7 +285,6 @@ class ServoLoop:
 
     def state_arrays(self) -> dict[str, Array]:
         """All that the rest of the run depends on but its scenario, by names; no log."""
-        self._settle()
         return arrays_of(self._kept())
 
     def restore_state(self, arrays: Mapping[str, Array]) -> None:
@@ -340,11 +293,8 @@ class ServoLoop:
         Raises:
             ValueError: The arrays are those of another loop.
         """
-        self._settle()
         restore_arrays(self._kept(), arrays)
         self._motion.forget()
-        if self._events is not None:
-            self._events.load(self._state())
 
     def _kept(self) -> list[Part]:
         def clocks() -> Array:
