@@ -128,6 +128,40 @@ def exponential_of(twist: Array) -> Array:
     return X
 
 
+def write_pose(X: RigidTransform, out: Array) -> None:
+    """Writes a pose as numbers for a state: rotation row by row, position; out has shape (12,)."""
+    matrix = X.GetAsMatrix34()
+    out[:9].reshape(3, 3)[:] = matrix[:, :3]
+    out[9:] = matrix[:, 3]
+
+
+@njit(cache=True)
+def floating_pose(state: Array) -> Array:
+    """Pose of a floating body as a matrix, shape (3, 4) [-, m], in the order of Drake's sums.
+
+    Args:
+        state: Its quaternion (w, x, y, z) of any length but 0, its position [m], and what else
+            there is.
+    """
+    square = 0.0
+    for i in range(4):
+        square += state[i] * state[i]
+    length = math.sqrt(square)
+    w, x, y, z = state[0] / length, state[1] / length, state[2] / length, state[3] / length
+    s = 2.0 / ((x * x + z * z) + (y * y + w * w))
+    sx, sy, sz = s * x, s * y, s * z
+    X = np.empty((3, 4))
+    X[0, 0], X[1, 1], X[2, 2] = (
+        1.0 - sy * y - sz * z, 1.0 - sx * x - sz * z, 1.0 - sx * x - sy * y
+    )  # fmt: skip
+    X[0, 1], X[1, 0] = sy * x - sz * w, sy * x + sz * w
+    X[0, 2], X[2, 0] = sz * x + sy * w, sz * x - sy * w
+    X[1, 2], X[2, 1] = sz * y - sx * w, sz * y + sx * w
+    for i in range(3):
+        X[i, 3] = state[4 + i]
+    return X
+
+
 def logarithm(X: RigidTransform) -> Array:
     """Inverse of `exponential`: the twist (rotation vector [rad], translation [m]), shape (6,).
 

@@ -180,7 +180,7 @@ class RobotMotion:
     def pose(self) -> RigidTransform:
         """X_WP now [m]."""
         if self._pose is None:
-            self._pose = pose_on_joint(self._joint, self._state)
+            self._pose = pose_on_joint(self._joint, self._platform)
         return self._pose
 
     def platform_state(self) -> Array:
@@ -196,7 +196,8 @@ class RobotMotion:
         return self._state[self._n : self._n + self._m]
 
     def cables(self) -> Array:
-        """What the cables do now, under the command that holds, rows as `TENSIONS` names them.
+        """What the cables do now, under the command that holds, rows as `TENSIONS` names them; the
+        same array each time.
 
         Raises:
             CableGeometryError: A cable cannot run.
@@ -207,7 +208,6 @@ class RobotMotion:
                 rates = self._speeds
             else:
                 ideal_rates(self._arrays.winch[0, 0], self._command, rates)
-            self._table = np.empty_like(self._table)  # whoever has the last one may keep it
             put_crept(self._crept, guesses_of(self._room, self._m))
             bad = self._outputs(
                 self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table

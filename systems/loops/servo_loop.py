@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -127,7 +127,8 @@ class ServoLoop:
         if self._corrector is not None:
             self._clocks.append(self._correction)
         self._struck: list[Clock] = []
-        self.log = LoopLog(self._logged())
+        resting = {"X_CO_measured", "found", f"{self.model.target.mark}_px", *self._servo.logged()}
+        self.log = LoopLog(self._logged(), resting | {"tension_corrections", "tension_thresholds"})
 
     def _connect(self, robot: Robot) -> None:
         """Makes cameras, estimators and sensors, and says who reads what."""
@@ -144,25 +145,23 @@ class ServoLoop:
             scenario.camera, model.target, model.mounting, model.pinhole,
             seed=scenario.seed, image_bias=scenario.perturbations.image_bias,
         )  # fmt: skip
-        eye = DelayedCamera(camera, read)
+        eye = DelayedCamera(camera, read, {"found", "X_CO", model.target.mark})
         self._eyes = [eye]
         ports |= {"found": eye.found, "X_CO": eye.pose, model.target.mark: eye.marks}
         task = model.estimator_task(scenario)
         kinds = (scenario.estimator.kind, *scenario.estimator.compare)
         systems = [checked_estimator(kind, task) for kind in kinds]
         self._estimates = [Estimate(system, read, self._now) for system in systems]
-        needed = {
-            system.get_input_port(index).get_name()
-            for system in systems
-            for index in range(system.num_input_ports())
-        } | {SENSORS[sensor].reading for sensor in scenario.sensors.log}
+        needed = {SENSORS[sensor].reading for sensor in scenario.sensors.log}
+        needed = needed.union(*(estimate.inputs for estimate in self._estimates))
         if self._corrector is not None:
             needed |= {"measured_tensions", "measured_lengths"}
         if needed & {"X_CK", "known_tag_found"}:
             assert scenario.estimator.known_tag is not None  # the settings were checked
             X_WK = scenario.estimator.known_tag.pose.transform()
             seen: Read = lambda name: X_WK if name == "X_WO" else ports[name]()  # noqa: E731
-            tag = DelayedCamera(known_tag_camera(scenario, robot, model.pinhole), seen)
+            second = known_tag_camera(scenario, robot, model.pinhole)
+            tag = DelayedCamera(second, seen, {"X_CK", "known_tag_found"})
             self._eyes.append(tag)
             ports |= {"X_CK": tag.pose, "known_tag_found": tag.found}
         for name, kind in SENSORS.items():
@@ -172,7 +171,7 @@ class ServoLoop:
             if sensor is None:
                 ports[kind.reading] = ports[kind.truth]
                 continue
-            part = Sampled(sensor, ports[kind.truth])
+            part = Sampled(sensor, ports[kind.truth], kind.reading)
             self._sensors.append((Clock(sensor.period), part))
             self._rates[name] = float(scenario.sensors.rate(name) or 1.0 / sensor.period)
             ports[kind.reading] = part.reading
@@ -229,9 +228,7 @@ class ServoLoop:
 
     def start(self) -> None:
         """Takes the first samples, and writes the log's first row; then `advance_to` goes on."""
-        samples = [(part, part.after(0.0)) for _, part in self._sensors]
-        for part, sample in samples:
-            part.take(sample)
+        self._look([part for _, part in self._sensors])
         self._struck = [clock for clock in self._clocks if clock.strikes(0.0)]
         self.log.append(0.0)
 
@@ -243,10 +240,12 @@ class ServoLoop:
             DivergedError: Numbers are not finite any more.
         """
         while self.time < boundary:
-            if self._struck:
+            if self._struck and self._struck != [self._logging]:
                 self._update()
             self.time = now = first_time(self._clocks, boundary)
             self._motion.advance(now)
+            for estimate in self._estimates:
+                estimate.forget()
             self._struck = [c for c in self._clocks if c.next == now and c.strikes(now)]
             if self._logging in self._struck:
                 self.log.append(self.time)
@@ -257,21 +256,16 @@ class ServoLoop:
     def _update(self) -> None:
         """Lets look and decide whose time has come."""
         struck, now = self._struck, self.time
-        looks: list[tuple[DelayedCamera | Sampled, Array]] = []
-        if self._image in struck:
-            looks += [(eye, eye.after(now)) for eye in self._eyes]
-        looks += [(part, part.after(now)) for clock, part in self._sensors if clock in struck]
-        for part, after in looks:
-            part.take(after)
+        eyes = self._eyes if self._image in struck else []
+        self._look([*eyes, *(part for clock, part in self._sensors if clock in struck)])
         corrected = None
         if self._corrector is not None and self._correction in struck:
             corrected = self._corrector.correct(self._read_estimated, self._law_memory)
         if self._control in struck:
-            memories = [estimate.after() for estimate in self._estimates]
             outputs, memory = self._servo.decide(self._read_estimated, self._memory, now)
             self._since, self._judged = self._monitor.judge(self._read, self._since, now)
-            for estimate, after in zip(self._estimates, memories, strict=True):
-                estimate.take(after)
+            for estimate in self._estimates:
+                estimate.step()
             self._outputs |= outputs
             self._memory = memory
         if corrected is not None:
@@ -282,6 +276,16 @@ class ServoLoop:
         if self._offsets is not None:
             velocities = np.add(velocities, self._offsets, out=self._commanded)
         self._motion.command(velocities)
+        self.log.refresh()
+
+    def _look(self, parts: Sequence[DelayedCamera | Sampled]) -> None:
+        """Takes images and samples of now, each of what stood there before the others."""
+        looks = [part.after(self.time) for part in parts]
+        for part, after in zip(parts, looks, strict=True):
+            part.take(after)
+            for estimate in self._estimates:
+                if not estimate.inputs.isdisjoint(part.outputs):
+                    estimate.forget()
 
     def state_arrays(self) -> dict[str, Array]:
         """All that the rest of the run depends on but its scenario, by names; no log."""
@@ -295,6 +299,7 @@ class ServoLoop:
         """
         restore_arrays(self._kept(), arrays)
         self._motion.forget()
+        self.log.refresh()
 
     def _kept(self) -> list[Part]:
         def clocks() -> Array:
@@ -324,7 +329,10 @@ class ServoLoop:
         parts += [
             Part(f"sensor{k}", part.sample, part.take) for k, (_, part) in enumerate(self._sensors)
         ]
-        parts += [attribute(f"estimate{k}", e, "memory") for k, e in enumerate(self._estimates)]
+        parts += [
+            attribute(f"estimate{k}", e, "memory")._replace(take=e.take)
+            for k, e in enumerate(self._estimates)
+        ]
         if self._corrector is not None:
             parts += [attribute(n, self, n) for n in ("_added", "_thresholds", "_law_memory")]
         return parts
