@@ -157,7 +157,7 @@ class PointTarget(Target):
         uv = np.empty((2, self.points.shape[1]))
         images_of(self.points, X, pinhole.numbers, uv)
         if noise > 0.0:
-            uv = uv + noise * random.standard_normal(uv.shape)
+            uv += noise * random.standard_normal(uv.shape)
         return uv.T.ravel()
 
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:

@@ -20,6 +20,9 @@ from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
+WORD = 2**32
+"""Seeds below it are one word of NumPy's generators."""
+
 
 class ProjectedCamera(TargetMeasurement):
     """Projects the target through pinhole and lens and adds pixel noise.
@@ -124,7 +127,9 @@ class _ImageNoise:
     longer than to project a target, which is not always seen."""
 
     def __init__(self, seed: int, number: int) -> None:
-        self._start = [seed, number]
+        self._start: Any = [seed, number]
+        if seed < WORD:  # the same numbers, without NumPy's way from a list to words
+            self._start = np.array([seed, number], np.uint32)
         self._random: np.random.Generator | None = None
 
     def standard_normal(self, size: Any) -> Any:

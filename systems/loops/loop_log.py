@@ -38,8 +38,8 @@ class LoopLog:
     def __init__(
         self, read: Mapping[str, Callable[[], Any] | RowOf], resting: Collection[str] = ()
     ) -> None:
-        """With what gives each quantity, by its name: a vector, a pose, or a row of a matrix; and
-        the names of those that rest between events."""
+        """With what gives each quantity, by its name: a vector, a pose or its matrix (3, 4), or a
+        row of a matrix; and the names of those that rest between events."""
         self.columns: dict[str, slice] = {}
         self._poses: set[str] = set()
         shapes: dict[Callable[[], Any], tuple[int, tuple[int, ...]]] = {}
@@ -49,8 +49,9 @@ class LoopLog:
             source, row = reader if isinstance(reader, RowOf) else (reader, None)
             value = source()
             if isinstance(value, RigidTransform):
-                self._poses.add(name)
                 value = value.GetAsMatrix34()
+            if row is None and value.shape == (3, 4):
+                self._poses.add(name)
             if source not in shapes:
                 shapes[source], rests[source] = (end, value.shape), name in resting
                 end += value.size

@@ -15,7 +15,7 @@ from cdpr_drake.dynamics.advance_kernel import REPORTED
 from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, RUBBING, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.geometry.poses import floating_pose_into
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.systems.loops.loop_state import Part, held
@@ -42,6 +42,7 @@ class RobotMotion:
     Attributes:
         robot: The robot.
         rule: How it is integrated.
+        has_motors: Whether motors drive the winches.
         report: Errors and numbers of steps so far, as `advance_kernel.REPORTED` says, shape (4,).
     """
 
@@ -85,7 +86,7 @@ class RobotMotion:
         )  # fmt: skip
         law = cable_law(self._model, self._set)
         self._room = make_room(self._set.count, law, joint.height)
-        self._outputs = outputs_kernel(law)
+        self._outputs, self._guesses = outputs_kernel(law), guesses_of(self._room, self._set.count)
         rooms = self._room, self._arrays.room, self._arrays.guesses
         self._searched = [(searched, searched.copy()) for searched in rooms]
         m = self._m = self._set.count
@@ -105,14 +106,12 @@ class RobotMotion:
         self._platform, self._lengths = self._state[: self._n], self._state[self._n : self._n + m]
         self._speeds = self._state[self._n + m : self._n + 2 * m]
         self._crept = self._state[size - self._arrays.kinds[CREEPING] :]
-        self._command = np.zeros(m)
+        self._command, self._limit = np.zeros(m), self._arrays.winch[0, 0]
+        self.has_motors = self._drive.kind == MOTORS
+        # Of what is present: the pose as an object, whether its matrix and the table are known.
         self._pose: RigidTransform | None = None
-        self._known = False
-
-    @property
-    def has_motors(self) -> bool:
-        """Whether motors drive the winches."""
-        return self._drive.kind == MOTORS
+        self._posed = self._known = False
+        self._matrix = np.empty((3, 4))
 
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
@@ -140,7 +139,7 @@ class RobotMotion:
         for searched, fresh in self._searched:
             searched[:] = fresh
         self.command(self._released)
-        self._pose = None
+        self._pose, self._posed = None, False
 
     def kept(self) -> list[Part]:
         """All that what follows depends on, as parts of a loop's state; where catenaries were found
@@ -153,11 +152,13 @@ class RobotMotion:
 
     def forget(self) -> None:
         """Computes anew what was computed of a state, after another was put in its place."""
-        self._pose, self._known = None, False
+        self._pose, self._posed = None, False
+        self.command(self._command)
 
     def command(self, velocities: Array) -> None:
         """Commands cable velocities from now on, shape (m,) [m/s], positive pays out."""
         self._command[:] = velocities
+        ideal_rates(self._limit, self._command, self._rates)
         self._known = False
 
     def advance(self, time: float) -> None:
@@ -173,15 +174,25 @@ class RobotMotion:
             self._memory,
         )  # fmt: skip
         self._present[:] = self._next
-        self._pose, self._known = None, False
+        self._pose, self._posed, self._known = None, False, False
         if bad != INTEGRATION_OK:
             raise self._problem(bad, time)
 
     def pose(self) -> RigidTransform:
         """X_WP now [m]."""
         if self._pose is None:
-            self._pose = pose_on_joint(self._joint, self._platform)
+            self._pose = RigidTransform.MakeUnchecked(self.pose_matrix())
         return self._pose
+
+    def pose_matrix(self) -> Array:
+        """Matrix (3, 4) of X_WP now [-, m]; the same array each time."""
+        if not self._posed:
+            if self._joint.is_floating:
+                floating_pose_into(self._platform, self._matrix)
+            else:
+                self._matrix[:] = self._joint.pose_at(self._platform).GetAsMatrix34()
+            self._posed = True
+        return self._matrix
 
     def platform_state(self) -> Array:
         """State of the platform now as the plant would have it; do not write into it."""
@@ -203,15 +214,12 @@ class RobotMotion:
             CableGeometryError: A cable cannot run.
         """
         if not self._known:
-            rates = self._rates
-            if self.has_motors:
-                rates = self._speeds
-            else:
-                ideal_rates(self._arrays.winch[0, 0], self._command, rates)
-            put_crept(self._crept, guesses_of(self._room, self._m))
+            if len(self._crept):
+                put_crept(self._crept, self._guesses)
             bad = self._outputs(
-                self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table
-            )
+                self._platform, self._lengths, self._speeds if self.has_motors else self._rates,
+                self._arrays.cables, self._room, self._table,
+            )  # fmt: skip
             if bad >= 0:
                 raise self._problem(bad, self._present[len(self._state)])
             self._known = True

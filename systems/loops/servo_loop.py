@@ -15,7 +15,7 @@ from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import projected_camera
 from cdpr_drake.systems.diagrams.estimators import known_tag_camera
 from cdpr_drake.systems.diagrams.servo_models import LoopServo, servo_model
-from cdpr_drake.systems.diagrams.servo_watches import LOGGED_OF_CABLES, make_monitor
+from cdpr_drake.systems.diagrams.servo_watches import LOGGED_OF_CABLES
 from cdpr_drake.systems.diagrams.tension_management import make_corrector
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.loop_log import LoopLog, RowOf
@@ -87,8 +87,9 @@ class ServoLoop:
         )
         self._sensors: list[tuple[Clock, Sampled]] = []
         self._rates: dict[str, float] = {}
-        self._servo = self.model.make_servo(scenario)
-        self._monitor = make_monitor(scenario, self.model)
+        self._servo, self._monitor = basis.servo, basis.monitor
+        if self.model is not basis.model:
+            self._servo = self.model.make_servo(scenario)
         self._outputs = self._servo.nothing()
         self._memory = self.model.controller.fresh_memory()
         m = len(robot.cables)
@@ -201,7 +202,7 @@ class ServoLoop:
             return RowOf(self._motion.cables, _ROWS[name])
 
         logged: dict[str, Callable[[], Any] | RowOf] = {
-            "X_WP": ports["X_WP"],
+            "X_WP": self._motion.pose_matrix,
             "X_WP_estimated": self._estimates[0].pose,
             "X_CO_measured": ports["X_CO"],
             "found": ports["found"],
