@@ -18,7 +18,13 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.pinhole import Pinhole, images_of, is_faced, is_pictured, normalize_points
+from cdpr_drake.vision.pinhole import (
+    Pinhole,
+    is_faced,
+    is_pictured,
+    normalize_points,
+    take_picture,
+)
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
 
 VISIBLE_BORDER = 1.0
@@ -151,11 +157,9 @@ class PointTarget(Target):
             if noise > 0.0:
                 uv = uv + noise * random.standard_normal(uv.shape)
             return uv.T.ravel()
-        X = _columns(X_CO)
-        if not is_pictured(self.outline, X, pinhole.numbers, VISIBLE_BORDER):
+        X, camera, uv = _columns(X_CO), pinhole.numbers, np.empty((2, self.points.shape[1]))
+        if not take_picture(self.points, self.outline, X, camera, VISIBLE_BORDER, uv):
             return None
-        uv = np.empty((2, self.points.shape[1]))
-        images_of(self.points, X, pinhole.numbers, uv)
         if noise > 0.0:
             uv += noise * random.standard_normal(uv.shape)
         return uv.T.ravel()

@@ -127,6 +127,7 @@ class ServoLoop:
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
             self._clocks.append(self._correction)
+        self._parts = [*((self._image, eye) for eye in self._eyes), *self._sensors]
         self._struck: list[Clock] = []
         resting = {"X_CO_measured", "found", f"{self.model.target.mark}_px", *self._servo.logged()}
         self.log = LoopLog(self._logged(), resting | {"tension_corrections", "tension_thresholds"})
@@ -257,8 +258,7 @@ class ServoLoop:
     def _update(self) -> None:
         """Lets look and decide whose time has come."""
         struck, now = self._struck, self.time
-        eyes = self._eyes if self._image in struck else []
-        self._look([*eyes, *(part for clock, part in self._sensors if clock in struck)])
+        self._look([part for clock, part in self._parts if clock in struck])
         corrected = None
         if self._corrector is not None and self._correction in struck:
             corrected = self._corrector.correct(self._read_estimated, self._law_memory)
