@@ -127,7 +127,9 @@ class ServoLoop:
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
             self._clocks.append(self._correction)
-        self._parts = [*((self._image, eye) for eye in self._eyes), *self._sensors]
+        self._parts: list[tuple[Clock, DelayedCamera | Sampled]] = [
+            *((self._image, eye) for eye in self._eyes), *self._sensors,
+        ]  # fmt: skip
         self._struck: list[Clock] = []
         resting = {"X_CO_measured", "found", f"{self.model.target.mark}_px", *self._servo.logged()}
         self.log = LoopLog(self._logged(), resting | {"tension_corrections", "tension_thresholds"})
