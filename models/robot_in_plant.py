@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.common.eigen_geometry import Quaternion, Quaternion_
+from pydrake.common.eigen_geometry import Quaternion_
 from pydrake.geometry import Box, Shape
 from pydrake.math import RigidTransform, RigidTransform_, RotationMatrix_
 from pydrake.multibody.plant import MultibodyPlant
@@ -32,7 +32,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
-from cdpr_drake.geometry.poses import euclidean_length
+from cdpr_drake.geometry.poses import floating_pose_into
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
 
@@ -144,8 +144,9 @@ def pose_on_joint(joint: PlatformJoint, state: Any) -> Any:
         return _pose_of_any(joint, state)
     if not joint.is_floating:
         return joint.pose_at(state)
-    q = state[:4]
-    return RigidTransform(quaternion=Quaternion(q / euclidean_length(q)), p=state[4:7])
+    matrix = np.empty((3, 4))
+    floating_pose_into(np.array(state[:7]), matrix)
+    return RigidTransform.MakeUnchecked(matrix)
 
 
 def _pose_of_any(joint: PlatformJoint, state: Any) -> Any:

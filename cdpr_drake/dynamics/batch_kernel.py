@@ -56,14 +56,14 @@ def robot_tables(stack: RobotArrays) -> np.ndarray:
 
 
 @intrinsic
-def _reach(typing: Any, kernel: Any, robot: Any, rule: Any, present: Any, command: Any,
+def call_reach(typing: Any, kernel: Any, robot: Any, rule: Any, present: Any, command: Any,
            others: Any, time: Any, memory: Any) -> Any:  # fmt: skip
     """What the kernel at an address returns."""
     return _REACH.return_type(types.intp, *_REACH.args), call_at_address(_REACH)
 
 
 @intrinsic
-def _outputs(typing: Any, kernel: Any, state: Any, l0: Any, l0_dot: Any, cables: Any, room: Any,
+def call_outputs(typing: Any, kernel: Any, state: Any, l0: Any, l0_dot: Any, cables: Any, room: Any,
              out: Any) -> Any:  # fmt: skip
     """What the kernel at an address returns."""
     return _OUTPUTS.return_type(types.intp, *_OUTPUTS.args), call_at_address(_OUTPUTS)
@@ -99,7 +99,7 @@ def advance_rows(
             if results[i] == INTEGRATION_OK:
                 memory[i, 2 * size] = np.nan
                 time = present[i, size - REPORTED - 1] + duration
-                results[i] = _reach(
+                results[i] = call_reach(
                     kernel, robots[i], rule, present[i], commands[k, i], others[i], time, memory[i]
                 )
                 for j in range(size):
@@ -131,4 +131,4 @@ def cables_of_rows(
     m = rates.shape[1]
     for i in range(first, past):
         state, lengths = present[i, :platform], present[i, platform : platform + m]
-        results[i] = _outputs(kernel, state, lengths, rates[i], cables[i], rooms[i], out[i])
+        results[i] = call_outputs(kernel, state, lengths, rates[i], cables[i], rooms[i], out[i])

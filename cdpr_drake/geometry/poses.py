@@ -98,13 +98,14 @@ def exponential(twist: Array) -> RigidTransform:
 
     Source: servoing thesis (2.1), there ordered (translation, rotation).
     """
-    X = exponential_of(np.ascontiguousarray(twist, dtype=float))
+    X = np.empty((3, 4))
+    exponential_into(np.ascontiguousarray(twist, dtype=float), X)
     return RigidTransform.MakeUnchecked(X)
 
 
 @njit(cache=True)
-def exponential_of(twist: Array) -> Array:
-    """exp of the twist as a matrix, shape (3, 4); R by a unit quaternion, so it is orthonormal."""
+def exponential_into(twist: Array, X: Array) -> None:
+    """X, shape (3, 4) <- exp of the twist; R by a unit quaternion, so it is orthonormal."""
     x, y, z = twist[0], twist[1], twist[2]
     square = x * x + y * y + z * z
     theta = np.sqrt(square)
@@ -117,7 +118,6 @@ def exponential_of(twist: Array) -> Array:
         b = 0.5 - square / 24.0
         c = 1.0 / 6.0 - square / 120.0
     qw = np.cos(theta / 2.0)
-    X = np.zeros((3, 4))
     quaternion_into(qw, half_sinc * x, half_sinc * y, half_sinc * z, 2.0, X)
     u, v, w = twist[3], twist[4], twist[5]
     # p = v + b (theta u x v) + c (theta u x (theta u x v))
@@ -125,7 +125,39 @@ def exponential_of(twist: Array) -> Array:
     X[0, 3] = u + b * cx + c * (y * cz - z * cy)
     X[1, 3] = v + b * cy + c * (z * cx - x * cz)
     X[2, 3] = w + b * cz + c * (x * cy - y * cx)
-    return X
+
+
+def write_pose(X: RigidTransform, out: Array) -> None:
+    """Writes a pose as numbers for a state: rotation row by row, position; out has shape (12,)."""
+    matrix = X.GetAsMatrix34()
+    out[:9].reshape(3, 3)[:] = matrix[:, :3]
+    out[9:] = matrix[:, 3]
+
+
+@njit(cache=True)
+def floating_pose_into(state: Array, X: Array) -> None:
+    """X, shape (3, 4) [-, m] <- pose of a floating body.
+
+    Args:
+        state: Its quaternion (w, x, y, z) of any length but 0, its position [m], and what else
+            there is.
+        X: Overwritten.
+    """
+    square = 0.0
+    for i in range(4):
+        square += state[i] * state[i]
+    length = math.sqrt(square)
+    w, x, y, z = state[0] / length, state[1] / length, state[2] / length, state[3] / length
+    s = 2.0 / ((x * x + z * z) + (y * y + w * w))
+    sx, sy, sz = s * x, s * y, s * z
+    X[0, 0], X[1, 1], X[2, 2] = (
+        1.0 - sy * y - sz * z, 1.0 - sx * x - sz * z, 1.0 - sx * x - sy * y
+    )  # fmt: skip
+    X[0, 1], X[1, 0] = sy * x - sz * w, sy * x + sz * w
+    X[0, 2], X[2, 0] = sz * x + sy * w, sz * x - sy * w
+    X[1, 2], X[2, 1] = sz * y - sx * w, sz * y + sx * w
+    for i in range(3):
+        X[i, 3] = state[4 + i]
 
 
 def logarithm(X: RigidTransform) -> Array:

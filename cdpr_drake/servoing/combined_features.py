@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
 from cdpr_drake.servoing.packed_features_kernel import switched_packed
 from cdpr_drake.servoing.partitioned_features_kernel import (
@@ -17,36 +16,14 @@ from cdpr_drake.servoing.partitioned_features_kernel import (
 from cdpr_drake.servoing.visual_features import (
     POSE_NAMES,
     CameraPoseFeatures,
+    KernelFeatures,
     ObjectPoseFeatures,
     PackedFeatures,
     PointFeatures,
-    Sighting,
-    VisualFeatures,
-    packed_sighting,
 )
 
 
-class CombinedFeatures(VisualFeatures):
-    """Features that one kernel computes, points among them."""
-
-    uses_marks = True
-
-    def __init__(self, names: tuple[str, ...], packed: PackedFeatures) -> None:
-        """With a name for each feature, and the kernel."""
-        self.names, self._packed = names, packed
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        s, L = np.empty(self._packed.size), np.empty((self._packed.size, 6))
-        self._packed.kernel(self._packed.numbers, packed_sighting(seen), s, L)
-        return s, L
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        return self._packed
-
-
-class PartitionedFeatures(CombinedFeatures):
+class PartitionedFeatures(KernelFeatures):
     """Image points, and for the optical axis alpha and ln sigma against their desired values.
 
     The segment is the longest one of the desired image unless it is given; the polygon goes through
@@ -55,6 +32,8 @@ class PartitionedFeatures(CombinedFeatures):
     Source: Corke and Hutchinson, A new partitioned approach to image-based visual servo control,
     2001, which says the longest segment of now; a fixed one has no jumps.
     """
+
+    uses_marks = True
 
     def __init__(self, points: PointFeatures, segment: tuple[int, int] | None = None) -> None:
         """Beside these points; `segment` has numbers of two of the chosen ones.
@@ -87,30 +66,28 @@ class PartitionedFeatures(CombinedFeatures):
                 "accepted: points that do"
             )
         # By the angle about their middle, in growing order, the area is positive.
-        numbers = [*ends, s[-2], s[-1], 1.0, *order, *points.packed().numbers]
-        super().__init__(
-            (*points.names, "alpha_rad", "ln_sigma"),
-            PackedFeatures(partitioned_packed, np.array(numbers, float), len(s)),
-        )
+        numbers = [*ends, s[-2], s[-1], 1.0, *order, *points.formula.numbers]
+        self.names = (*points.names, "alpha_rad", "ln_sigma")
+        super().__init__(PackedFeatures(partitioned_packed, np.array(numbers, float), len(s)))
 
     def units(self) -> tuple[str, ...]:
         """As the base class says."""
         return (*("" for _ in self.names[:-AXIS_FEATURES]), "rad", "")
 
 
-class SwitchedFeatures(CombinedFeatures):
+class SwitchedFeatures(KernelFeatures):
     """A pose, six features, then image points: what pose-based and image-based servoing need.
 
     Source: Gans and Hutchinson, Stable visual servoing through hybrid switched-system control,
     2007.
     """
 
+    uses_marks = True
+
     def __init__(self, points: PointFeatures, of_camera: bool = True) -> None:
         """Before these points, the pose of `CameraPoseFeatures`, or of `ObjectPoseFeatures` if not
         `of_camera`."""
         pose = (CameraPoseFeatures if of_camera else ObjectPoseFeatures)(points.X_CdO)
-        numbers = [np.array([float(of_camera)]), pose.packed().numbers, points.packed().numbers]
-        names = (*POSE_NAMES, *points.names)
-        super().__init__(
-            names, PackedFeatures(switched_packed, np.concatenate(numbers), len(names))
-        )
+        numbers = [np.array([float(of_camera)]), pose.formula.numbers, points.formula.numbers]
+        self.names, packed = (*POSE_NAMES, *points.names), np.concatenate(numbers)
+        super().__init__(PackedFeatures(switched_packed, packed, len(self.names)))

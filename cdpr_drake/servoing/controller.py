@@ -251,15 +251,6 @@ class ServoController:
         look_and_step_at(self._steps[number][0], seen, X_WP, time, memory, out)
         return self._command(out), memory
 
-    def step_tables(self) -> Array:
-        """Of each task what `look_and_step_at` takes as its table, where `sees_packed`, shape
-        (tasks, 8, 4), whole numbers; a controller's as long as it lives."""
-        return np.array([table for table, _ in self._steps])
-
-    def task_begins(self) -> Array:
-        """Times at which tasks take over, shape (tasks,) [s]."""
-        return self._begins.copy()
-
     def _command(self, out: Array) -> Command:
         m = self.cable_count
         return Command(out[:m], out[m : m + 6], out[m + 6 : -1], float(out[-1]))

@@ -1,4 +1,4 @@
-"""Features as kernels with one signature, so that a compiled loop can evaluate any of them.
+"""Features as kernels with one signature, so that a step of the law can evaluate any of them.
 
 `kernel(numbers, seen, s, L)` writes s, shape (k,), and L, shape (k, 6). What is seen is one vector:
 X_CO as its matrix (3, 4) column by column, the centre (2), the marks as `Sighting` has them, row by

@@ -3,33 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import VisualFeatureError
-from cdpr_drake.servoing.interaction_matrix_kernel import point_into
 
 COLLINEAR_SPREAD = 1e-6
 """Points whose spread across is less than this share of that along count as collinear."""
-
-
-@njit(cache=True)
-def points_interaction(xy: Array, depths: Array) -> Array:
-    """L with d(x_1, y_1, x_2, ...)/dt = L @ V_C for points at rest, shape (2 n, 6) [-, 1/m].
-
-    V_C = (w, v) is the camera's twist in C [rad/s, m/s].
-
-    Args:
-        xy: Images (x, y) at unit focal length, shape (2, n) [-].
-        depths: Z of the points in C, shape (n,) [m].
-
-    Source: servoing thesis (1.43), (1.44), there with twists (translation, rotation).
-    """
-    n = xy.shape[1]
-    L = np.empty((2 * n, 6))
-    for k in range(n):
-        point_into(xy[0, k], xy[1, k], depths[k], L, 2 * k)
-    return L
 
 
 def check_points(p_OK: Array) -> None:

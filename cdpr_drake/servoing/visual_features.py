@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.servoing.circle_features import ellipses_interaction, plane_of
+from cdpr_drake.servoing.circle_features import plane_of
 from cdpr_drake.servoing.packed_features_kernel import (
     CENTER,
     MARKS,
@@ -20,13 +20,8 @@ from cdpr_drake.servoing.packed_features_kernel import (
     object_pose_packed,
     points_packed,
 )
-from cdpr_drake.servoing.point_features import check_points, points_interaction
-from cdpr_drake.servoing.pose_features import (
-    camera_pose_feature,
-    hybrid_feature,
-    object_pose_feature,
-    pose_arrays,
-)
+from cdpr_drake.servoing.point_features import check_points
+from cdpr_drake.servoing.pose_features import pose_arrays
 
 OPTICAL_AXIS = 2
 """Row of theta u_z in the pose features and in the 2 1/2 D feature."""
@@ -60,14 +55,9 @@ def sighting(X_CO: RigidTransform, marks: Array) -> Sighting:
     return Sighting(R, p, p[:2] / p[2], marks)
 
 
-def for_kernels(seen: Sighting) -> tuple[Array, Array]:
-    """Its rotation and position in the order of C and writable, as `pose_arrays` gives them."""
-    return np.ascontiguousarray(seen.R_CO), np.array(seen.p_CO)
-
-
 @dataclass(frozen=True)
 class PackedFeatures:
-    """Features for compiled loops, see `packed_features_kernel`.
+    """Features as a kernel computes them, see `packed_features_kernel`.
 
     Attributes:
         kernel: What computes.
@@ -95,14 +85,14 @@ class DepthRule:
     value: float = np.nan
 
     def fixed(self, desired: Array) -> Array:
-        """Depths as numbers for a kernel: NaN where they are those of now, shape (n,) [m]."""
-        return self.depths(np.full(np.shape(desired), np.nan), desired)
+        """Depths as numbers for a kernel: NaN where they are those of now, shape (n,) [m].
 
-    def depths(self, now: Array, desired: Array) -> Array:
-        """Depths to use, from those of now and of the desired pose, shape (n,) [m]."""
-        if self.kind == "pose":
-            return now
-        return desired if self.kind == "desired" else np.full(now.shape, self.value)
+        Args:
+            desired: Those of the desired pose, shape (n,) [m].
+        """
+        if self.kind == "desired":
+            return desired
+        return np.full(np.shape(desired), np.nan if self.kind == "pose" else self.value)
 
 
 class VisualFeatures(ABC):
@@ -129,48 +119,54 @@ class VisualFeatures(ABC):
         """s, shape (k,), and L, shape (k, 6)."""
 
     def packed(self) -> PackedFeatures | None:
-        """The same for compiled loops; None: only `evaluate` can say."""
+        """The same as a kernel; None: only `evaluate` can say."""
         return None
 
 
-class ObjectPoseFeatures(VisualFeatures):
+class KernelFeatures(VisualFeatures):
+    """Features that a kernel computes.
+
+    Attributes:
+        formula: The kernel and its numbers.
+    """
+
+    def __init__(self, formula: PackedFeatures) -> None:
+        """With the kernel and its numbers."""
+        self.formula = formula
+
+    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
+        """As the base class says."""
+        formula = self.formula
+        s, L = np.empty(formula.size), np.empty((formula.size, 6))
+        formula.kernel(formula.numbers, packed_sighting(seen), s, L)
+        return s, L
+
+    def packed(self) -> PackedFeatures | None:
+        """As the base class says."""
+        return self.formula
+
+
+class ObjectPoseFeatures(KernelFeatures):
     """PBVS with (theta u, p_CO): the object's origin moves straight in the image."""
 
     names = POSE_NAMES
 
     def __init__(self, X_CdO: RigidTransform) -> None:
         """For a desired pose of the object in the camera."""
-        self._R_CdO, self._X_CdO = X_CdO.rotation().matrix().copy(), columns(X_CdO)
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        return object_pose_feature(*for_kernels(seen), self._R_CdO)
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        return PackedFeatures(object_pose_packed, self._X_CdO, 6)
+        super().__init__(PackedFeatures(object_pose_packed, columns(X_CdO), 6))
 
 
-class CameraPoseFeatures(VisualFeatures):
+class CameraPoseFeatures(KernelFeatures):
     """PBVS with (theta u, p_CdC): the camera moves straight."""
 
     names = POSE_NAMES
 
     def __init__(self, X_CdO: RigidTransform) -> None:
         """For a desired pose of the object in the camera."""
-        self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
-        self._X_CdO = columns(X_CdO)
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        return camera_pose_feature(*for_kernels(seen), *self._desired)
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        return PackedFeatures(camera_pose_packed, self._X_CdO, 6)
+        super().__init__(PackedFeatures(camera_pose_packed, columns(X_CdO), 6))
 
 
-class HybridFeatures(VisualFeatures):
+class HybridFeatures(KernelFeatures):
     """2 1/2 D: the camera moves straight, and so does the object's origin in the image."""
 
     names = HYBRID_NAMES
@@ -178,22 +174,12 @@ class HybridFeatures(VisualFeatures):
 
     def __init__(self, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For a desired pose of the object in the camera."""
-        self._desired = X_CdO.rotation().matrix().copy(), X_CdO.translation().copy()
-        self._X_CdO = columns(X_CdO)
-        self._depth = depth or DepthRule()
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        Z = self._depth.depths(seen.p_CO[2:], self._desired[1][2:])[0]
-        return hybrid_feature(*for_kernels(seen), *self._desired, seen.center, Z)
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        depth = self._depth.fixed(self._desired[1][2:])
-        return PackedFeatures(hybrid_packed, np.concatenate([self._X_CdO, depth]), 6)
+        fixed = (depth or DepthRule()).fixed(X_CdO.translation()[2:])
+        numbers = np.concatenate([columns(X_CdO), fixed])
+        super().__init__(PackedFeatures(hybrid_packed, numbers, 6))
 
 
-class PointFeatures(VisualFeatures):
+class PointFeatures(KernelFeatures):
     """IBVS: images of at least three points.
 
     Attributes:
@@ -217,56 +203,33 @@ class PointFeatures(VisualFeatures):
             VisualFeatureError: Fewer than three points, or all on one line.
         """
         self.chosen = list(range(p_OK.shape[1]) if chosen is None else chosen)
-        self._p_OK = np.ascontiguousarray(p_OK[:, self.chosen])
-        check_points(self._p_OK)
-        self._depth = depth or DepthRule()
-        self.X_CdO, self.desired = X_CdO, X_CdO @ self._p_OK
+        points = np.ascontiguousarray(p_OK[:, self.chosen])
+        check_points(points)
+        self.X_CdO, self.desired = X_CdO, X_CdO @ points
         self.names = tuple(f"{axis}{k}" for k in self.chosen for axis in "xy")
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says."""
-        xy = seen.marks[:, self.chosen]
-        now = seen.R_CO[2] @ self._p_OK + seen.p_CO[2]
-        L = points_interaction(xy, self._depth.depths(now, self.desired[2]))
-        return xy.T.ravel(), L
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        depths = self._depth.fixed(self.desired[2])
-        numbers = np.vstack([np.array(self.chosen, float), self._p_OK, depths]).T
-        return PackedFeatures(points_packed, np.ravel(numbers), len(self.names))
+        depths = (depth or DepthRule()).fixed(self.desired[2])
+        numbers = np.vstack([np.array(self.chosen, float), points, depths]).T
+        super().__init__(PackedFeatures(points_packed, np.ravel(numbers), len(self.names)))
 
 
-class CircleFeatures(VisualFeatures):
-    """Centre and moments of two or more concentric circles; leaves the optical axis free."""
+class CircleFeatures(KernelFeatures):
+    """Centre and moments of two or more concentric circles; leaves the optical axis free.
+
+    A constant depth means a plane parallel to the image.
+    """
 
     rank = 5
     uses_marks = True
 
     def __init__(self, radii: Array, X_CdO: RigidTransform, depth: DepthRule | None = None) -> None:
         """For circles of these radii [m]."""
-        self._depth = depth or DepthRule()
-        self._desired_plane = plane_of(*pose_arrays(X_CdO))
+        rule, plane = depth or DepthRule(), np.full(3, np.nan)
+        if rule.kind == "desired":
+            plane = plane_of(*pose_arrays(X_CdO))
+        elif rule.kind != "pose":
+            plane = np.array([0.0, 0.0, 1.0 / rule.value])
         self.names = tuple(f"{name}_{k}" for k in range(len(radii)) for name in ELLIPSE_NAMES)
-
-    def evaluate(self, seen: Sighting) -> tuple[Array, Array]:
-        """As the base class says; a constant depth means a plane parallel to the image."""
-        if self._depth.kind == "pose":
-            plane = plane_of(*for_kernels(seen))
-        elif self._depth.kind == "desired":
-            plane = self._desired_plane
-        else:
-            plane = np.array([0.0, 0.0, 1.0 / self._depth.value])
-        return seen.marks.ravel(), ellipses_interaction(seen.marks, plane)
-
-    def packed(self) -> PackedFeatures:
-        """As the base class says."""
-        plane = np.full(3, np.nan)
-        if self._depth.kind == "desired":
-            plane = self._desired_plane
-        elif self._depth.kind != "pose":
-            plane = np.array([0.0, 0.0, 1.0 / self._depth.value])
-        return PackedFeatures(circles_packed, plane, len(self.names))
+        super().__init__(PackedFeatures(circles_packed, plane, len(self.names)))
 
 
 class WithoutFeature(VisualFeatures):

@@ -215,6 +215,17 @@ def is_pictured(points: Array, X: Array, camera: Array, border: float) -> bool:
 
 
 @njit(cache=True)
+def take_picture(
+    points: Array, outline: Array, X: Array, camera: Array, border: float, uv: Array
+) -> bool:
+    """Writes `images_of` points where `is_pictured` holds of an outline; whether it does."""
+    if not is_pictured(outline, X, camera, border):
+        return False
+    images_of(points, X, camera, uv)
+    return True
+
+
+@njit(cache=True)
 def normalize_points(marks: Array, camera: Array, out: Array) -> None:
     """Points (u, v), one after the other, shape (2 n,) [px], to all x and then all y, shape (2 n,).
 

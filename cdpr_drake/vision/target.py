@@ -7,8 +7,10 @@ carries; `blank_picture`, `draw_disc` and `picture_png` make such pictures.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import cv2
@@ -16,7 +18,13 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.vision.pinhole import Pinhole, images_of, is_faced, is_pictured, normalize_points
+from cdpr_drake.vision.pinhole import (
+    Pinhole,
+    is_faced,
+    is_pictured,
+    normalize_points,
+    take_picture,
+)
 from cdpr_drake.vision.planar_pose_kernel import planar_pose
 
 VISIBLE_BORDER = 1.0
@@ -149,23 +157,25 @@ class PointTarget(Target):
             if noise > 0.0:
                 uv = uv + noise * random.standard_normal(uv.shape)
             return uv.T.ravel()
-        X = _columns(X_CO)
-        if not is_pictured(self.outline, X, pinhole.numbers, VISIBLE_BORDER):
+        X, camera, uv = _columns(X_CO), pinhole.numbers, np.empty((2, self.points.shape[1]))
+        if not take_picture(self.points, self.outline, X, camera, VISIBLE_BORDER, uv):
             return None
-        uv = np.empty((2, self.points.shape[1]))
-        images_of(self.points, X, pinhole.numbers, uv)
         if noise > 0.0:
-            uv = uv + noise * random.standard_normal(uv.shape)
+            uv += noise * random.standard_normal(uv.shape)
         return uv.T.ravel()
 
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
         """As the base class says."""
-        uv = marks.reshape(-1, 2).T
-        seen = np.isfinite(uv)
-        if seen.all():
-            return pose_from_points(self.points, uv, pinhole)
-        whole = np.all(seen, axis=0)
-        return pose_from_points(self.points[:, whole], uv[:, whole], pinhole)
+        points, image = self._rows, np.ascontiguousarray(marks).reshape(-1, 2)
+        if not math.isfinite(marks @ marks):
+            seen = np.all(np.isfinite(image), axis=1)
+            points, image = points[seen], image[seen]
+        return _pose_from_rows(points, image, pinhole)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """The points as rows, shape (n, 3) [m]."""
+        return np.ascontiguousarray(self.points.T)
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
@@ -207,10 +217,14 @@ def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform
         uv: Their images, shape (2, n) [px].
         pinhole: The camera.
     """
-    if p_OK.shape[1] < 4:
+    return _pose_from_rows(np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T), pinhole)
+
+
+def _pose_from_rows(points: Array, image: Array, pinhole: Pinhole) -> RigidTransform | None:
+    """As `pose_from_points`, of points and images in rows, shape (n, 3) [m] and (n, 2) [px]."""
+    if len(points) < 4:
         return None
-    points, image = np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T)
-    if p_OK[2].any():
+    if np.count_nonzero(points[:, 2]):
         return _pose_in_space(points, image, pinhole)
     R, p = np.empty((3, 3)), np.empty(3)
     if not planar_pose(points, image, pinhole.numbers, R, p):

@@ -20,6 +20,9 @@ from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
+IMAGES_AHEAD = 16
+"""Images for which random numbers are made ready at once."""
+
 
 class ProjectedCamera(TargetMeasurement):
     """Projects the target through pinhole and lens and adds pixel noise.
@@ -65,7 +68,7 @@ class ProjectedCamera(TargetMeasurement):
         """
         super().__init__(target, pinhole, rate, latency_frames, image_bias)
         self._mounting, self._camera, self._focus = mounting, pinhole, focus
-        self._rate, self._noise, self._seed = rate, pixel_noise, seed
+        self._rate, self._noise, self._random = rate, pixel_noise, _ImageNoise(seed)
         self._fault = fault
         self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
         if not mounting.is_eye_to_hand():
@@ -107,7 +110,7 @@ class ProjectedCamera(TargetMeasurement):
         X_CO = mounting.X_CO(read("X_WP"), X_WO)
         if X_off is not None:
             X_CO = X_off @ X_CO
-        random = _ImageNoise(self._seed, round(time * self._rate))
+        random = self._random.of(round(time * self._rate))
         return self.target.project(X_CO, self._zoomed(time), self._noise, random)
 
     def _zoomed(self, time: float) -> Pinhole:
@@ -120,15 +123,29 @@ class ProjectedCamera(TargetMeasurement):
 
 
 class _ImageNoise:
-    """Random numbers of one image; the generator is made when they are asked for, since that takes
-    longer than to project a target, which is not always seen."""
+    """Random numbers of each image of a camera, the same by seed and number.
 
-    def __init__(self, seed: int, number: int) -> None:
-        self._start = [seed, number]
+    NumPy's generator takes longer to make than a target to project, and the half of that where
+    several are made in a row. So they are made ahead, and only for images that ask; each is used
+    once, as an image that is taken again begins anew.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._seed, self._number = seed, 0
+        self._ahead: dict[int, np.random.Generator] = {}
         self._random: np.random.Generator | None = None
+
+    def of(self, number: int) -> _ImageNoise:
+        """Those of an image from now on."""
+        self._number, self._random = number, None
+        return self
 
     def standard_normal(self, size: Any) -> Any:
         """As numpy's Generator."""
         if self._random is None:
-            self._random = np.random.default_rng(self._start)
+            number = self._number
+            if number not in self._ahead:
+                numbers = range(number, number + IMAGES_AHEAD)
+                self._ahead = {k: np.random.default_rng([self._seed, k]) for k in numbers}
+            self._random = self._ahead.pop(number)
         return self._random.standard_normal(size)

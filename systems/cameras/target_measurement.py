@@ -16,6 +16,7 @@ from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
+from cdpr_drake.geometry.poses import write_pose
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
 from cdpr_drake.vision.lens_picture import StraightPicture
 from cdpr_drake.vision.mark_reading import found_marks, moved_marks, read_marks
@@ -136,23 +137,22 @@ class TargetMeasurement(LeafSystem):
     def next_frames(self, frames: Array, marks: Array | None) -> Array:
         """The frames in the delay line after an image with marks, or without the target; marks as
         `Target.follow` gives them, or without their quality."""
-        values = np.empty(len(frames))
-        values[self._frame_size :] = frames[: -self._frame_size]
-        values[: self._frame_size] = 0.0
-        values[self._quality] = np.nan
-        if marks is not None and len(marks) > self.target.size:
-            values[self._quality] = marks[self.target.size :]
-            marks = marks[: self.target.size]
-        if marks is not None:
-            marks = self.read_marks(marks)
-        camera = self.pinhole.ideal
-        X_CO = None if marks is None else self.target.solve(marks, camera)
-        if marks is not None and X_CO is not None:
-            at = self._pose_at
+        values, target, camera = np.zeros(len(frames)), self.target, self.pinhole.ideal
+        if self._oldest:
+            values[self._frame_size :] = frames[: -self._frame_size]
+        if target.quality:
+            values[self._quality] = np.nan
+        if marks is None:
+            return values
+        if len(marks) > target.size:
+            values[self._quality] = marks[target.size :]
+            marks = marks[: target.size]
+        marks = self.read_marks(marks)
+        X_CO = target.solve(marks, camera)
+        if X_CO is not None:
             values[0] = 1.0
-            values[self._marks] = self.target.complete(marks, X_CO, camera)
-            values[at : at + 9] = X_CO.rotation().matrix().ravel()
-            values[at + 9 : at + 12] = X_CO.translation()
+            values[self._marks] = target.complete(marks, X_CO, camera)
+            write_pose(X_CO, values[self._pose_at : self._pose_at + 12])
         return values
 
     def read_marks(self, marks: Array) -> Array:

@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, Value
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.pose_from_images import pose_from_object
+from cdpr_drake.geometry.poses import write_pose
 
 NOW = 1e-9
 """Times that differ by less are the same instant [s]."""
@@ -145,7 +146,9 @@ class PoseEstimator(LeafSystem):
             reset = now + tag.period
         after = np.empty(len(memory))
         after[_UPDATED], after[_DUE], after[_RESET] = now, now + self._period, reset
-        after[_POSE], after[_EXTRA:] = pack_pose(X_WP), extra
+        write_pose(X_WP, after[_POSE])
+        if len(extra):
+            after[_EXTRA:] = extra
         return after
 
     def estimate(
@@ -175,7 +178,7 @@ class PoseEstimator(LeafSystem):
 def pack_pose(X: RigidTransform) -> Array:
     """A pose as numbers for a state: rotation row by row, position; shape (12,)."""
     values = np.empty(12)
-    values[:9], values[9:] = X.rotation().matrix().ravel(), X.translation()
+    write_pose(X, values)
     return values
 
 

@@ -10,9 +10,12 @@ from pathlib import Path
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
+from cdpr_drake.systems.diagrams.servo_watches import make_monitor
 from cdpr_drake.systems.diagrams.visual_servo import integration_step
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
+from cdpr_drake.systems.monitoring.run_monitor import RunMonitor
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
@@ -26,6 +29,8 @@ class LoopBasis:
         max_step: Integration step [s], but for sensors that read more often.
         resting: State of platform and winches at the start, shape (n,).
         model: What the servo is about, for a seed of 0.
+        servo: Its block.
+        monitor: What judges a run.
         motion: A motion of the robot; others are made like it.
     """
 
@@ -33,6 +38,8 @@ class LoopBasis:
     max_step: float
     resting: Array
     model: ServoModel
+    servo: FeatureServo
+    monitor: RunMonitor
     motion: RobotMotion
 
 
@@ -59,4 +66,7 @@ def _basis(common: bytes, path: Path, changed: int, size: int) -> LoopBasis:
     wrong = scenario.perturbations
     X_WP = scenario.initial_pose.transform()
     resting = motion.resting(X_WP, wrong.slack, wrong.slack_at_rest)
-    return LoopBasis(robot, max_step, resting, model, motion)
+    return LoopBasis(
+        robot, max_step, resting, model, model.make_servo(scenario), make_monitor(scenario, model),
+        motion,
+    )  # fmt: skip

@@ -13,7 +13,6 @@ from cdpr_drake.systems.diagrams.servo_models import servo_model
 from cdpr_drake.systems.diagrams.visual_servo import Addition
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
-from cdpr_drake.systems.loops.servo_events import python_reason
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, PLANT
 from cdpr_drake.systems.scenarios.run_settings import (
     DIAGRAM,
@@ -146,7 +145,7 @@ def set_loop(
         return set_engine(scenario, repeated)
     if uses_compiled_loop(asked):
         checked = check_loop(asked)
-        return checked, f"{asked.name}: by the compiled loop{_steps(checked)}"  # type: ignore[return-value]
+        return checked, f"{asked.name}: by the compiled loop"  # type: ignore[return-value]
     chosen, words = set_engine(asked, repeated)
     why = many_steps_reason(asked, repeated)
     if not why or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
@@ -156,11 +155,5 @@ def set_loop(
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
     other = "with overrides integration.loop=diagram"
     made = replace(chosen, integration=replace(chosen.integration, loop=COMPILED))
-    words = f"{asked.name}: by the compiled loop{_steps(made)}, as {why}; else {other}"
+    words = f"{asked.name}: by the compiled loop, as {why}; else {other}"
     return made, words  # type: ignore[return-value]
-
-
-def _steps(scenario: Scenario) -> str:
-    """Words on who goes from event to event, where no kernel does."""
-    reason = python_reason(scenario, servo_model(scenario, loop_basis(scenario).robot))
-    return f" (its events in Python, since {reason})" if reason else ""

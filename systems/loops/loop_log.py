@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,8 +14,6 @@ from cdpr_drake.geometry.poses import pose_rows_of
 
 FIRST_ROWS = 512
 """Rows for which there is room at the start."""
-
-_VECTOR, _POSE, _MATRIX = range(3)
 
 
 class RowOf(NamedTuple):
@@ -32,67 +31,58 @@ class RowOf(NamedTuple):
 class LoopLog:
     """Rows of vectors and poses; what `RunLog` is for a diagram, for the same log.
 
-    What gives a quantity gives another object when it has changed: one that stands there again is
-    not read again, and keeps its columns of the row before.
+    Quantities are read for each row, but those that rest between events by `refresh`, after an
+    event.
     """
 
-    def __init__(self, read: Mapping[str, Callable[[], Any] | RowOf]) -> None:
-        """With what gives each quantity, by its name: a vector, or a pose, read as `pose_row`."""
-        self._readers: list[tuple[slice, Callable[[], Any], int]] = []
+    def __init__(
+        self, read: Mapping[str, Callable[[], Any] | RowOf], resting: Collection[str] = ()
+    ) -> None:
+        """With what gives each quantity, by its name: a vector, a pose or its matrix (3, 4), or a
+        row of a matrix; and the names of those that rest between events."""
         self.columns: dict[str, slice] = {}
         self._poses: set[str] = set()
-        end, matrices = 0, dict[Callable[[], Array], int]()
+        shapes: dict[Callable[[], Any], tuple[int, tuple[int, ...]]] = {}
+        rests: dict[Callable[[], Any], bool] = {}
+        end = 0
         for name, reader in read.items():
-            if isinstance(reader, RowOf):
-                rows, m = reader.matrix().shape
-                if reader.matrix not in matrices:
-                    matrices[reader.matrix] = end
-                    self._readers.append((slice(end, end + rows * m), reader.matrix, _MATRIX))
-                    end += rows * m
-                first = matrices[reader.matrix] + reader.row * m
-                self.columns[name] = slice(first, first + m)
-                continue
-            value = reader()
-            is_pose = isinstance(value, RigidTransform)
-            if is_pose:
+            source, row = reader if isinstance(reader, RowOf) else (reader, None)
+            value = source()
+            if isinstance(value, RigidTransform):
+                value = value.GetAsMatrix34()
+            if row is None and value.shape == (3, 4):
                 self._poses.add(name)
-            columns = slice(end, end + (12 if is_pose else len(value)))
-            self.columns[name], end = columns, columns.stop
-            self._readers.append((columns, reader, _POSE if is_pose else _VECTOR))
-        self._shown: list[Any] = [None] * len(self._readers)
+            if source not in shapes:
+                shapes[source], rests[source] = (end, value.shape), name in resting
+                end += value.size
+            first, size = shapes[source][0], value.size
+            if row is not None:
+                size = value.shape[1]
+                first += row * size
+            self.columns[name] = slice(first, first + size)
+        self._now = np.zeros(end)
+        self._moving: list[tuple[Array, Callable[[], Any]]] = []
+        self._resting: list[tuple[Array, Callable[[], Any]]] = []
+        for source, (first, shape) in shapes.items():
+            view = self._now[first : first + math.prod(shape)].reshape(shape)
+            (self._resting if rests[source] else self._moving).append((view, source))
         self._times, self._rows, self._count = np.empty(FIRST_ROWS), np.empty((FIRST_ROWS, end)), 0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Reads the quantities that rest between events."""
+        _write(self._resting)
 
     def append(self, time: float) -> None:
         """Adds a row of now, at a time [s]."""
-        if self._count == len(self._times):
+        count = self._count
+        if count == len(self._times):
             self._times = np.concatenate([self._times, np.empty_like(self._times)])
             self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
-        row, shown = self._rows[self._count], self._shown
-        if self._count:
-            row[:] = self._rows[self._count - 1]
-        for k, (columns, reader, kind) in enumerate(self._readers):
-            value = reader()
-            if value is not shown[k]:
-                shown[k] = value
-                if kind == _POSE:
-                    value = value.GetAsMatrix34()
-                row[columns] = value if kind == _VECTOR else value.ravel()
-        self._times[self._count] = time
-        self._count += 1
-
-    def make_room(self, rows: int) -> tuple[Array, Array]:
-        """Times and rows of all columns, with room for so many more rows, from `rows()` on."""
-        missing = self._count + rows - len(self._times)
-        if missing > 0:
-            more = max(missing, len(self._times))
-            self._times = np.concatenate([self._times, np.empty(more)])
-            self._rows = np.concatenate([self._rows, np.empty((more, self._rows.shape[1]))])
-        return self._times, self._rows
-
-    def take(self, count: int) -> None:
-        """Says that there are so many rows, after others were written into `make_room`."""
-        self._count = count
-        self._shown = [None] * len(self._readers)
+        _write(self._moving)
+        self._rows[count] = self._now
+        self._times[count] = time
+        self._count = count + 1
 
     def read(self, _: object = None) -> dict[str, Array]:
         """Times "time", shape (n,) [s], and each quantity, shape (n, size)."""
@@ -114,4 +104,9 @@ class LoopLog:
     def clear(self, _: object = None) -> None:
         """Forgets them; what comes is logged as before."""
         self._count = 0
-        self._shown = [None] * len(self._readers)
+
+
+def _write(sources: list[tuple[Array, Callable[[], Any]]]) -> None:
+    for view, source in sources:
+        value = source()
+        view[:] = value.GetAsMatrix34() if value.__class__ is RigidTransform else value

@@ -48,11 +48,15 @@ def checked_sensor(name: str, scenario: Scenario, robot: Robot) -> SampledSensor
 
 
 class DelayedCamera:
-    """A projected camera and the images in its delay line."""
+    """A projected camera and the images in its delay line.
 
-    def __init__(self, camera: ProjectedCamera, read: Read) -> None:
+    Attributes:
+        outputs: Names by which its measurements are read.
+    """
+
+    def __init__(self, camera: ProjectedCamera, read: Read, outputs: set[str]) -> None:
         """Before the first image."""
-        self._camera, self._read = camera, read
+        self._camera, self._read, self.outputs = camera, read, outputs
         self.take(camera.no_frames())
 
     def after(self, now: float) -> Array:
@@ -86,11 +90,15 @@ class DelayedCamera:
 
 
 class Sampled:
-    """A sensor and its last sample."""
+    """A sensor and its last sample.
 
-    def __init__(self, sensor: SampledSensor, truth: Callable[[], Any]) -> None:
+    Attributes:
+        outputs: The name by which it is read.
+    """
+
+    def __init__(self, sensor: SampledSensor, truth: Callable[[], Any], output: str) -> None:
         """Before the first sample."""
-        self._sensor, self._truth = sensor, truth
+        self._sensor, self._truth, self.outputs = sensor, truth, {output}
         self.take(sensor.nothing())
 
     def after(self, now: float) -> Array:
@@ -110,61 +118,15 @@ class Sampled:
         return self._reading
 
 
-class _Believed:
-    """The pose in an estimator's memory, unpacked once."""
-
-    def __init__(self, system: PoseEstimator) -> None:
-        """Of an estimator; before the first memory."""
-        self._system, self._memory, self._pose = system, np.zeros(0), RigidTransform()
-
-    def at(self, memory: Array) -> RigidTransform:
-        """The pose X_WP of a memory [m]."""
-        if self._memory is not memory:
-            self._memory, self._pose = memory, self._system.believed(memory)
-        return self._pose
-
-
-class _Kept:
-    """What was computed last, while time, memory and what was read for it stay.
-
-    Whatever changes in a loop is another object.
-    """
-
-    def __init__(
-        self,
-        compute: Callable[[Read, Array, float, RigidTransform], Any],
-        read: Read,
-        believed: _Believed,
-    ) -> None:
-        """With what computes it from inputs, memory, time [s] and the pose in the memory, and
-        what gives the inputs and that pose."""
-        self._compute, self._read, self._believed = compute, read, believed
-        self._inputs: dict[str, Any] = {}
-        self._memory, self._time = np.zeros(0), np.nan
-        self._value: Any = None
-
-    def at(self, memory: Array, time: float) -> Any:
-        """The value of a memory at a time [s]."""
-        if self._time == time and self._memory is memory and self._unchanged():
-            return self._value
-        self._inputs = {}
-        self._value = self._compute(self._remember, memory, time, self._believed.at(memory))
-        self._memory, self._time = memory, time
-        return self._value
-
-    def _remember(self, name: str) -> Any:
-        value = self._inputs[name] = self._read(name)
-        return value
-
-    def _unchanged(self) -> bool:
-        for name, value in self._inputs.items():  # noqa: SIM110  # a generator costs more
-            if self._read(name) is not value:
-                return False
-        return True
-
-
 class Estimate:
-    """An estimator of the platform's pose and its memory."""
+    """An estimator of the platform's pose and its memory.
+
+    What it computes of an instant it keeps, until `forget` says that the time or an input changed.
+
+    Attributes:
+        memory: The memory of now; empty for an estimator that takes no steps.
+        inputs: Names of what it reads.
+    """
 
     def __init__(
         self,
@@ -173,34 +135,45 @@ class Estimate:
         now: Callable[[], float],
     ) -> None:
         """Before the first step; `now` gives the time [s]."""
-        self._read, self._now = read, now
-        self._system = system
-        self.memory, self._takes_steps = np.zeros(0), isinstance(system, PoseEstimator)
-        if isinstance(system, PoseEstimator):
-            self.memory, self._is_due = system.start(), system.is_due
-            self._believed = _Believed(system)
-            self._upcoming = _Kept(system.upcoming, read, self._believed)
-            self._pose = _Kept(system.estimate, read, self._believed)
-
-    def pose(self) -> RigidTransform:
-        """Estimate X_WP of now [m]."""
-        system = self._system
-        if isinstance(system, MeasuredPose | ShiftedPose):
-            return system.passed_on(self._read("X_WP_measured"))
-        time = self._now()
-        memory = self.memory
-        if self._is_due(memory, time):
-            memory = self._upcoming.at(memory, time)
-        pose: RigidTransform = self._pose.at(memory, time)
-        return pose
-
-    def after(self) -> Array:
-        """The memory after a step now; that of before of an estimator that takes no steps."""
-        if not self._takes_steps:
-            return self.memory
-        after: Array = self._upcoming.at(self.memory, self._now())
-        return after
+        self._system, self._read, self._now = system, read, now
+        ports = (system.get_input_port(index) for index in range(system.num_input_ports()))
+        self.inputs = {port.get_name() for port in ports}
+        self.take(system.start() if isinstance(system, PoseEstimator) else np.zeros(0))
 
     def take(self, memory: Array) -> None:
-        """Makes it the memory of now."""
+        """Makes a memory the one of now."""
         self.memory = memory
+        if isinstance(self._system, PoseEstimator):
+            self._believed = self._system.believed(memory)
+        self.forget()
+
+    def forget(self) -> None:
+        """Has all computed again: the time or an input changed."""
+        self._upcoming: tuple[Array, RigidTransform] | None = None
+        self._pose: RigidTransform | None = None
+
+    def pose(self) -> RigidTransform:
+        """Estimate X_WP of now [m], with the step of control in it that is due."""
+        if self._pose is None:
+            system = self._system
+            if isinstance(system, PoseEstimator):
+                now, memory, believed = self._now(), self.memory, self._believed
+                if system.is_due(memory, now):
+                    memory, believed = self._after(system, now)
+                self._pose = system.estimate(self._read, memory, now, believed)
+            else:
+                self._pose = system.passed_on(self._read("X_WP_measured"))
+        return self._pose
+
+    def step(self) -> None:
+        """Takes the step of control of now."""
+        if isinstance(self._system, PoseEstimator):
+            self.memory, self._believed = self._after(self._system, self._now())
+        self.forget()
+
+    def _after(self, system: PoseEstimator, now: float) -> tuple[Array, RigidTransform]:
+        """Memory after a step now, and the pose in it."""
+        if self._upcoming is None:
+            memory = system.upcoming(self._read, self.memory, now, self._believed)
+            self._upcoming = memory, system.believed(memory)
+        return self._upcoming

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.behaving_kernel import put_crept
 from cdpr_drake.cables.models import cable_law
-from cdpr_drake.cables.simulation_kernel import OUTPUTS, guesses_of, make_room, outputs_kernel
+from cdpr_drake.cables.simulation_kernel import OUTPUTS, make_room, outputs_kernel
 from cdpr_drake.cables.states import crept_at_rest
 from cdpr_drake.dynamics.advance_events_kernel import fresh_memory, robot_addresses
 from cdpr_drake.dynamics.advance_kernel import REPORTED
+from cdpr_drake.dynamics.batch_kernel import outputs_address, reach_address
+from cdpr_drake.dynamics.lone_robot_kernel import LoneRobot, move, see_cables
 from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, RUBBING, pack_robot
-from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK, ideal_rates
+from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_in_plant import pose_on_joint
+from cdpr_drake.geometry.poses import floating_pose_into
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.numerics.kernel_calls import array_addresses
 from cdpr_drake.systems.loops.loop_state import Part, held
 from cdpr_drake.systems.robots.assembly import equilibrium_start
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
@@ -38,44 +38,13 @@ TENSIONS, DRUM_TENSIONS, LENGTHS, SLACK, SURPLUS = range(5)
 """Rows of `RobotMotion.cables`, in the order of `simulation_kernel.model_outputs`."""
 
 
-class MotionArrays(NamedTuple):
-    """What kernels take of a `RobotMotion`; they write into its own arrays.
-
-    Attributes:
-        robot: `robot_addresses` of the robot.
-        reach: The kernel that integrates.
-        outputs: The kernel that says what the cables do.
-        rule: Numbers of the rule for `reach`.
-        present: State, its time and the report, now.
-        command: Commanded cable velocities, shape (m,) [m/s].
-        calm: Rates of the command and the brakes, both zero, shape (2, m).
-        memory: Memory of `reach`.
-        cables: The cables, shape (m, k).
-        room: Work space of `outputs`.
-        limit: Largest speed of ideal winches, shape (1,) [m/s].
-        platform: Numbers of the platform's state.
-    """
-
-    robot: np.ndarray
-    reach: Any
-    outputs: Any
-    rule: Array
-    present: Array
-    command: Array
-    calm: Array
-    memory: Array
-    cables: Array
-    room: Array
-    limit: Array
-    platform: int
-
-
 class RobotMotion:
     """What `CompiledMotion` is in a diagram, by the same kernels: winches follow velocities.
 
     Attributes:
         robot: The robot.
         rule: How it is integrated.
+        has_motors: Whether motors drive the winches.
         report: Errors and numbers of steps so far, as `advance_kernel.REPORTED` says, shape (4,).
     """
 
@@ -101,7 +70,7 @@ class RobotMotion:
             RobotFileError: Winches with motors are asked for that the robot's file does not
                 describe.
         """
-        self.robot, self.rule, self._packed = robot, rule, PackedRule(rule)
+        self.robot, self.rule = robot, rule
         self._model = settings.cables.model_of(robot)
         if like is None:
             self._set = simulated_cables(settings.cables.cable_set(robot), self._model)
@@ -119,48 +88,32 @@ class RobotMotion:
         )  # fmt: skip
         law = cable_law(self._model, self._set)
         self._room = make_room(self._set.count, law, joint.height)
-        self._outputs = outputs_kernel(law)
         rooms = self._room, self._arrays.room, self._arrays.guesses
         self._searched = [(searched, searched.copy()) for searched in rooms]
-        m = self._m = self._set.count
-        self._n = joint.num_states
-        self._released, self._calm = np.zeros(m), np.zeros((2, m))
-        self._table, self._rates, self._torques = (
-            np.zeros((OUTPUTS, m)),
-            np.zeros(m),
-            np.zeros((2, m)),
-        )
+        m, n = self._set.count, joint.num_states
         size = self._arrays.work.shape[1]
-        self._where, self._memory = robot_addresses(self._arrays), fresh_memory(size, m)
-        # State, its time and the report, now, and where `integrate_explicit` writes what is next.
+        # State, its time and the report, as they are now.
         self._present = np.zeros(size + 1 + REPORTED)
-        self._next = self._memory[len(self._present) : 2 * len(self._present)]
         self._state, self.report = self._present[:size], self._present[size + 1 :]
-        self._platform, self._lengths = self._state[: self._n], self._state[self._n : self._n + m]
-        self._speeds = self._state[self._n + m : self._n + 2 * m]
-        self._crept = self._state[size - self._arrays.kinds[CREEPING] :]
-        self._command = np.zeros(m)
-        self._pose: RigidTransform | None = None
-        self._known = False
-
-    @property
-    def has_motors(self) -> bool:
-        """Whether motors drive the winches."""
-        return self._drive.kind == MOTORS
-
-    @property
-    def is_floating(self) -> bool:
-        """Whether the platform is a floating body."""
-        return self._joint.is_floating
-
-    def kernel_arrays(self) -> MotionArrays:
-        """What a kernel needs that goes from event to event; the motion must be kept, and
-        `forget` be told."""
-        return MotionArrays(
-            self._where, self._packed.reach, self._outputs, self._packed.numbers, self._present,
-            self._command, self._calm, self._memory, self._arrays.cables, self._room,
-            np.array([self._arrays.winch[0, 0]]), self._n,
+        self._platform, self._winches = self._state[:n], self._state[n:]
+        self._lengths, self._speeds = self._winches[:m], self._winches[m : 2 * m]
+        self._command, self._released, self._torques = np.zeros(m), np.zeros(m), np.zeros((2, m))
+        self.has_motors = self._drive.kind == MOTORS
+        self._memory, self._table = fresh_memory(size, m), np.zeros((OUTPUTS, m))
+        packed = PackedRule(rule)
+        self._kernel_arrays = LoneRobot(
+            np.array([reach_address(packed.reach), outputs_address(outputs_kernel(law)), n]),
+            packed.numbers, self._present, self._command, np.zeros((2, m)), self._memory,
+            self._arrays.cables, self._room, self._table,
+            self._state[size - self._arrays.kinds[CREEPING] :],
+            self._speeds if self.has_motors else np.zeros(m),
+            np.array([np.nan if self.has_motors else self._arrays.winch[0, 0]]),
         )  # fmt: skip
+        self._robot, self._at = robot_addresses(self._arrays), array_addresses(self._kernel_arrays)
+        # Of what is present: the pose as an object, whether its matrix and the table are known.
+        self._pose: RigidTransform | None = None
+        self._posed = self._known = False
+        self._matrix = np.empty((3, 4))
 
     def resting(
         self, X_WP: RigidTransform, slack: Array | None = None, at_rest: bool = False
@@ -188,7 +141,7 @@ class RobotMotion:
         for searched, fresh in self._searched:
             searched[:] = fresh
         self.command(self._released)
-        self._pose = None
+        self._pose, self._posed = None, False
 
     def kept(self) -> list[Part]:
         """All that what follows depends on, as parts of a loop's state; where catenaries were found
@@ -201,7 +154,8 @@ class RobotMotion:
 
     def forget(self) -> None:
         """Computes anew what was computed of a state, after another was put in its place."""
-        self._pose, self._known = None, False
+        self._pose, self._posed = None, False
+        self.command(self._command)
 
     def command(self, velocities: Array) -> None:
         """Commands cable velocities from now on, shape (m,) [m/s], positive pays out."""
@@ -215,21 +169,26 @@ class RobotMotion:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
-        packed = self._packed
-        bad = packed.reach(
-            self._where, packed.numbers, self._present, self._command, self._calm, time,
-            self._memory,
-        )  # fmt: skip
-        self._present[:] = self._next
-        self._pose, self._known = None, False
+        bad = move(self._at, self._robot, time)
+        self._pose, self._posed, self._known = None, False, False
         if bad != INTEGRATION_OK:
             raise self._problem(bad, time)
 
     def pose(self) -> RigidTransform:
         """X_WP now [m]."""
         if self._pose is None:
-            self._pose = pose_on_joint(self._joint, self._state)
+            self._pose = RigidTransform.MakeUnchecked(self.pose_matrix())
         return self._pose
+
+    def pose_matrix(self) -> Array:
+        """Matrix (3, 4) of X_WP now [-, m]; the same array each time."""
+        if not self._posed:
+            if self._joint.is_floating:
+                floating_pose_into(self._platform, self._matrix)
+            else:
+                self._matrix[:] = self._joint.pose_at(self._platform).GetAsMatrix34()
+            self._posed = True
+        return self._matrix
 
     def platform_state(self) -> Array:
         """State of the platform now as the plant would have it; do not write into it."""
@@ -241,25 +200,17 @@ class RobotMotion:
 
     def unstrained_lengths(self) -> Array:
         """Those of now, shape (m,) [m]."""
-        return self._state[self._n : self._n + self._m]
+        return self._lengths
 
     def cables(self) -> Array:
-        """What the cables do now, under the command that holds, rows as `TENSIONS` names them.
+        """What the cables do now, under the command that holds, rows as `TENSIONS` names them; the
+        same array each time.
 
         Raises:
             CableGeometryError: A cable cannot run.
         """
         if not self._known:
-            rates = self._rates
-            if self.has_motors:
-                rates = self._speeds
-            else:
-                ideal_rates(self._arrays.winch[0, 0], self._command, rates)
-            self._table = np.empty_like(self._table)  # whoever has the last one may keep it
-            put_crept(self._crept, guesses_of(self._room, self._m))
-            bad = self._outputs(
-                self._platform, self._lengths, rates, self._arrays.cables, self._room, self._table
-            )
+            bad = see_cables(self._at)
             if bad >= 0:
                 raise self._problem(bad, self._present[len(self._state)])
             self._known = True
@@ -270,7 +221,7 @@ class RobotMotion:
         law = self._drive.law
         assert law is not None
         winch_torques(
-            self._state[self._n :], self.cables()[DRUM_TENSIONS], self._command, self._released,
+            self._winches, self.cables()[DRUM_TENSIONS], self._command, self._released,
             self._home, MODES[self._drive.mode], pack_winch(law), self._torques,
         )  # fmt: skip
         return self._torques

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -15,7 +15,7 @@ from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import projected_camera
 from cdpr_drake.systems.diagrams.estimators import known_tag_camera
 from cdpr_drake.systems.diagrams.servo_models import LoopServo, servo_model
-from cdpr_drake.systems.diagrams.servo_watches import LOGGED_OF_CABLES, make_monitor
+from cdpr_drake.systems.diagrams.servo_watches import LOGGED_OF_CABLES
 from cdpr_drake.systems.diagrams.tension_management import make_corrector
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.loop_log import LoopLog, RowOf
@@ -37,7 +37,6 @@ from cdpr_drake.systems.loops.parts import (
     checked_sensor,
 )
 from cdpr_drake.systems.loops.robot_motion import LENGTHS, SLACK, SURPLUS, TENSIONS, RobotMotion
-from cdpr_drake.systems.loops.servo_events import ServoEvents, ServoState, python_reason
 from cdpr_drake.systems.monitoring.run_monitor import NOT_YET, Outcome
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -62,7 +61,6 @@ class ServoLoop:
         max_step: Integration step [s].
         time: Time that has been reached [s].
         outcome: How the run ended; RUNNING till then.
-        python_reason: Why it goes from event to event in Python; empty: one kernel does.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -89,8 +87,9 @@ class ServoLoop:
         )
         self._sensors: list[tuple[Clock, Sampled]] = []
         self._rates: dict[str, float] = {}
-        self._servo = self.model.make_servo(scenario)
-        self._monitor = make_monitor(scenario, self.model)
+        self._servo, self._monitor = basis.servo, basis.monitor
+        if self.model is not basis.model:
+            self._servo = self.model.make_servo(scenario)
         self._outputs = self._servo.nothing()
         self._memory = self.model.controller.fresh_memory()
         m = len(robot.cables)
@@ -128,10 +127,12 @@ class ServoLoop:
         self._clocks += [clock for clock, _ in self._sensors]
         if self._corrector is not None:
             self._clocks.append(self._correction)
+        self._parts: list[tuple[Clock, DelayedCamera | Sampled]] = [
+            *((self._image, eye) for eye in self._eyes), *self._sensors,
+        ]  # fmt: skip
         self._struck: list[Clock] = []
-        self.log = LoopLog(self._logged())
-        self._events: ServoEvents | None = None
-        self.python_reason = python_reason(scenario, self.model)
+        resting = {"X_CO_measured", "found", f"{self.model.target.mark}_px", *self._servo.logged()}
+        self.log = LoopLog(self._logged(), resting | {"tension_corrections", "tension_thresholds"})
 
     def _connect(self, robot: Robot) -> None:
         """Makes cameras, estimators and sensors, and says who reads what."""
@@ -148,25 +149,23 @@ class ServoLoop:
             scenario.camera, model.target, model.mounting, model.pinhole,
             seed=scenario.seed, image_bias=scenario.perturbations.image_bias,
         )  # fmt: skip
-        eye = DelayedCamera(camera, read)
+        eye = DelayedCamera(camera, read, {"found", "X_CO", model.target.mark})
         self._eyes = [eye]
         ports |= {"found": eye.found, "X_CO": eye.pose, model.target.mark: eye.marks}
         task = model.estimator_task(scenario)
         kinds = (scenario.estimator.kind, *scenario.estimator.compare)
         systems = [checked_estimator(kind, task) for kind in kinds]
         self._estimates = [Estimate(system, read, self._now) for system in systems]
-        needed = {
-            system.get_input_port(index).get_name()
-            for system in systems
-            for index in range(system.num_input_ports())
-        } | {SENSORS[sensor].reading for sensor in scenario.sensors.log}
+        needed = {SENSORS[sensor].reading for sensor in scenario.sensors.log}
+        needed = needed.union(*(estimate.inputs for estimate in self._estimates))
         if self._corrector is not None:
             needed |= {"measured_tensions", "measured_lengths"}
         if needed & {"X_CK", "known_tag_found"}:
             assert scenario.estimator.known_tag is not None  # the settings were checked
             X_WK = scenario.estimator.known_tag.pose.transform()
             seen: Read = lambda name: X_WK if name == "X_WO" else ports[name]()  # noqa: E731
-            tag = DelayedCamera(known_tag_camera(scenario, robot, model.pinhole), seen)
+            second = known_tag_camera(scenario, robot, model.pinhole)
+            tag = DelayedCamera(second, seen, {"X_CK", "known_tag_found"})
             self._eyes.append(tag)
             ports |= {"X_CK": tag.pose, "known_tag_found": tag.found}
         for name, kind in SENSORS.items():
@@ -176,7 +175,7 @@ class ServoLoop:
             if sensor is None:
                 ports[kind.reading] = ports[kind.truth]
                 continue
-            part = Sampled(sensor, ports[kind.truth])
+            part = Sampled(sensor, ports[kind.truth], kind.reading)
             self._sensors.append((Clock(sensor.period), part))
             self._rates[name] = float(scenario.sensors.rate(name) or 1.0 / sensor.period)
             ports[kind.reading] = part.reading
@@ -206,7 +205,7 @@ class ServoLoop:
             return RowOf(self._motion.cables, _ROWS[name])
 
         logged: dict[str, Callable[[], Any] | RowOf] = {
-            "X_WP": ports["X_WP"],
+            "X_WP": self._motion.pose_matrix,
             "X_WP_estimated": self._estimates[0].pose,
             "X_CO_measured": ports["X_CO"],
             "found": ports["found"],
@@ -233,9 +232,7 @@ class ServoLoop:
 
     def start(self) -> None:
         """Takes the first samples, and writes the log's first row; then `advance_to` goes on."""
-        samples = [(part, part.after(0.0)) for _, part in self._sensors]
-        for part, sample in samples:
-            part.take(sample)
+        self._look([part for _, part in self._sensors])
         self._struck = [clock for clock in self._clocks if clock.strikes(0.0)]
         self.log.append(0.0)
 
@@ -246,14 +243,13 @@ class ServoLoop:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
-        if not self.python_reason:
-            self._advance_compiled(boundary)
-            return
         while self.time < boundary:
-            if self._struck:
+            if self._struck and self._struck != [self._logging]:
                 self._update()
             self.time = now = first_time(self._clocks, boundary)
             self._motion.advance(now)
+            for estimate in self._estimates:
+                estimate.forget()
             self._struck = [c for c in self._clocks if c.next == now and c.strikes(now)]
             if self._logging in self._struck:
                 self.log.append(self.time)
@@ -261,63 +257,18 @@ class ServoLoop:
                 self.outcome = self._judged
                 return
 
-    def _advance_compiled(self, boundary: float) -> None:
-        if self._events is None:
-            self._events = ServoEvents(
-                self.scenario, self.model, self._servo, self._monitor, self._motion,
-                offsets=self._offsets, log=self.log, state=self._state(),
-            )  # fmt: skip
-        try:
-            self._events.advance_to(boundary)
-        finally:
-            self.time, self.outcome = self._events.time, Outcome(self._events.outcome)
-
-    def _state(self) -> ServoState:
-        clocks = (self._control, self._logging, self._image)
-        return ServoState(
-            np.array([[clock.period, clock.next, clock in self._struck] for clock in clocks]),
-            np.array([self.time, *self._since, float(self._judged), float(self.outcome)]),
-            self._eyes[0].frames(),
-            [estimate.memory for estimate in self._estimates],
-            self._memory,
-            self._outputs,
-        )
-
-    def _settle(self) -> None:
-        """Takes over where the kernel stands."""
-        if self._events is None:
-            return
-        state = self._events.state()
-        clocks = (self._control, self._logging, self._image)
-        for clock, (_, later, _) in zip(clocks, state.clocks, strict=True):
-            clock.next = float(later)
-        strikes = state.clocks[:, 2] != 0.0
-        self._struck = [clock for clock, now in zip(clocks, strikes, strict=True) if now]
-        _, reached, lost, judged, _ = state.run.tolist()
-        self._since, self._judged = (reached, lost), Outcome(int(judged))
-        self._eyes[0].take(state.frames)
-        for estimate, memory in zip(self._estimates, state.estimates, strict=True):
-            estimate.take(memory)
-        self._memory, self._outputs = state.servo, state.outputs
-
     def _update(self) -> None:
         """Lets look and decide whose time has come."""
         struck, now = self._struck, self.time
-        looks: list[tuple[DelayedCamera | Sampled, Array]] = []
-        if self._image in struck:
-            looks += [(eye, eye.after(now)) for eye in self._eyes]
-        looks += [(part, part.after(now)) for clock, part in self._sensors if clock in struck]
-        for part, after in looks:
-            part.take(after)
+        self._look([part for clock, part in self._parts if clock in struck])
         corrected = None
         if self._corrector is not None and self._correction in struck:
             corrected = self._corrector.correct(self._read_estimated, self._law_memory)
         if self._control in struck:
-            memories = [estimate.after() for estimate in self._estimates]
             outputs, memory = self._servo.decide(self._read_estimated, self._memory, now)
             self._since, self._judged = self._monitor.judge(self._read, self._since, now)
-            for estimate, after in zip(self._estimates, memories, strict=True):
-                estimate.take(after)
+            for estimate in self._estimates:
+                estimate.step()
             self._outputs |= outputs
             self._memory = memory
         if corrected is not None:
@@ -328,10 +279,19 @@ class ServoLoop:
         if self._offsets is not None:
             velocities = np.add(velocities, self._offsets, out=self._commanded)
         self._motion.command(velocities)
+        self.log.refresh()
+
+    def _look(self, parts: Sequence[DelayedCamera | Sampled]) -> None:
+        """Takes images and samples of now, each of what stood there before the others."""
+        looks = [part.after(self.time) for part in parts]
+        for part, after in zip(parts, looks, strict=True):
+            part.take(after)
+            for estimate in self._estimates:
+                if not estimate.inputs.isdisjoint(part.outputs):
+                    estimate.forget()
 
     def state_arrays(self) -> dict[str, Array]:
         """All that the rest of the run depends on but its scenario, by names; no log."""
-        self._settle()
         return arrays_of(self._kept())
 
     def restore_state(self, arrays: Mapping[str, Array]) -> None:
@@ -340,11 +300,9 @@ class ServoLoop:
         Raises:
             ValueError: The arrays are those of another loop.
         """
-        self._settle()
         restore_arrays(self._kept(), arrays)
         self._motion.forget()
-        if self._events is not None:
-            self._events.load(self._state())
+        self.log.refresh()
 
     def _kept(self) -> list[Part]:
         def clocks() -> Array:
@@ -374,7 +332,10 @@ class ServoLoop:
         parts += [
             Part(f"sensor{k}", part.sample, part.take) for k, (_, part) in enumerate(self._sensors)
         ]
-        parts += [attribute(f"estimate{k}", e, "memory") for k, e in enumerate(self._estimates)]
+        parts += [
+            attribute(f"estimate{k}", e, "memory")._replace(take=e.take)
+            for k, e in enumerate(self._estimates)
+        ]
         if self._corrector is not None:
             parts += [attribute(n, self, n) for n in ("_added", "_thresholds", "_law_memory")]
         return parts

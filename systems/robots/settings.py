@@ -68,7 +68,7 @@ class CableSettings:
                 simulated cables.
         """
         words = robot.geometry_words(self.pulleys)
-        if believed is None or robot.geometry_words(believed) == words:
+        if believed in (None, self.pulleys) or robot.geometry_words(believed) == words:
             return words
         return f"{words}; in the controller's model {robot.geometry_words(believed)}"
 

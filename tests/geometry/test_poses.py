@@ -1,7 +1,5 @@
 """Rotations, twists, adjoints and accuracy against matrix exponentials, differences and Drake."""
 
-import math
-
 import numpy as np
 import pytest
 import scipy.linalg
@@ -10,21 +8,11 @@ from hypothesis import strategies as st
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from cdpr_drake.geometry.drake_pose_kernel import (
-    compose,
-    invert,
-    pack_rows,
-    pose_of_floating,
-    project,
-    square_sum,
-    unpack_rows,
-)
 from cdpr_drake.geometry.pose_accuracy import distances_from_line, mean_pose, repeatability
 from cdpr_drake.geometry.poses import (
     adjoint,
     angles_from_rotation,
     cross_matrix,
-    euclidean_length,
     exponential,
     logarithm,
     pose_error,
@@ -35,7 +23,6 @@ from cdpr_drake.geometry.poses import (
 )
 from cdpr_drake.geometry.rotation_kernel import quaternion_of_matrix, solve_damped, turn_pose
 from tests.geometry.geometry_cases import few, twist, unit, vector
-from tests.processors import needs_fused_products
 
 ROUNDING = 1e-14  # a few products of numbers of size one
 EXPONENTIAL = 1e-11  # (1 - cos theta) / theta^2 loses half the digits near theta = 1e-4
@@ -169,55 +156,6 @@ def test_damped_equations(damping):
         np.testing.assert_allclose((A + damping * np.diag(np.diag(A))) @ x, -g, atol=1e-6)
     for singular in (J[:5].T @ J[:5], np.full((6, 6), np.nan)):
         assert solve_damped(singular, np.ones(6), 0.0, C, x) < 0.0
-
-
-def columns(X):
-    return np.asarray(X.GetAsMatrix34().ravel("F"))
-
-
-def check_projection(rough):
-    """The nearest rotation, from rows and from columns, has Drake's bits."""
-    nearest, out = RotationMatrix.ProjectToRotationMatrix(rough).matrix().ravel("F"), np.zeros(12)
-    for order, by_rows in (("C", True), ("F", False)):
-        project(rough.ravel(order), 0, by_rows, out)
-        np.testing.assert_array_equal(out[:9], nearest)
-
-
-@needs_fused_products
-def test_kernels_of_poses_have_drakes_bits():
-    """Rotations near one, where states round, and farther, where sweeps are many."""
-    random, out, packed = np.random.default_rng(1), np.zeros(12), np.zeros(20)
-    before = RigidTransform()
-    for state in random.standard_normal((200, 7)):
-        q = state[:4] / euclidean_length(state[:4])
-        X = RigidTransform(quaternion=Quaternion(q), p=state[4:])
-        pose_of_floating(state, out)
-        np.testing.assert_array_equal(out, columns(X))
-        compose(columns(before), columns(X), out)
-        np.testing.assert_array_equal(out, columns(before @ X))
-        invert(columns(X), out)
-        np.testing.assert_array_equal(out, columns(X.inverse()))
-        assert math.sqrt(square_sum(state, 4, 7)) == euclidean_length(state[4:])
-        pack_rows(columns(X), packed, 5)
-        np.testing.assert_array_equal(packed[5:14].reshape(3, 3), X.rotation().matrix())
-        unpack_rows(packed, 5, out)
-        again = RotationMatrix.ProjectToRotationMatrix(X.rotation().matrix())
-        np.testing.assert_array_equal(out, columns(RigidTransform(again, X.translation())))
-        for exponent in (-17, -16, -12, -6, -2):
-            noise = 10.0**exponent * random.standard_normal((3, 3))
-            check_projection(X.rotation().matrix() + noise)
-        before = X
-
-
-@needs_fused_products
-@pytest.mark.parametrize("k", range(64))
-def test_nearest_rotations_of_quarter_turns(k):
-    """Zeros, where sweeps leave out turns and equal sizes are sorted."""
-    R = RotationMatrix.MakeXRotation(k % 4 * math.pi / 2)
-    R = R @ RotationMatrix.MakeYRotation(k // 4 % 4 * math.pi / 2)
-    R = R @ RotationMatrix.MakeZRotation(k // 16 * math.pi / 2)
-    check_projection(R.matrix())
-    check_projection(np.round(R.matrix()))
 
 
 def at(*p, turn=0.0, axis=(0, 0, 1)):

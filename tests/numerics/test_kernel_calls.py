@@ -1,4 +1,4 @@
-"""Arrays by their addresses, rows in threads, and numpy's normal numbers, for kernels."""
+"""Arrays by their addresses, and rows in threads, for kernels."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,6 @@ from cdpr_drake.numerics.kernel_calls import (
     over_rows,
     vector_at,
 )
-from cdpr_drake.numerics.normal_numbers_kernel import seed_words, standard_normals
 
 
 @njit
@@ -81,20 +80,3 @@ def test_an_error_in_a_thread_is_the_callers():
 
     with pytest.raises(ValueError, match="row"):
         over_rows(fails, 40, 2)
-
-
-@pytest.mark.parametrize("seed", [0, 1, 2**32 - 1, 2**32, 2**70 + 5])
-def test_normal_numbers_of_seeds_and_streams_are_numpys(seed):
-    out, words = np.empty(8), seed_words(seed)
-    for number in range(200):
-        standard_normals(words, number, out)
-        expected = np.random.default_rng([seed, number]).standard_normal(8)
-        np.testing.assert_array_equal(out, expected)
-
-
-def test_a_long_stream_with_its_tail():
-    """Beyond the layers of numpy's ziggurat, where numbers come from logarithms."""
-    out = np.empty(200_000)
-    standard_normals(seed_words(5), 1, out)
-    np.testing.assert_array_equal(out, np.random.default_rng([5, 1]).standard_normal(len(out)))
-    assert np.max(np.abs(out)) > 3.6541528853610088

@@ -10,15 +10,16 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import VisualFeatureError
 from cdpr_drake.geometry.poses import exponential, pose_from_angles, rotation_from_vector
 from cdpr_drake.servoing.combined_features import PartitionedFeatures
-from cdpr_drake.servoing.packed_features_kernel import CENTER, MARKS, feature_kernel
-from cdpr_drake.servoing.point_features import check_points, interaction_rank, points_interaction
+from cdpr_drake.servoing.interaction_matrix_kernel import point_into
+from cdpr_drake.servoing.packed_features_kernel import CENTER, MARKS
+from cdpr_drake.servoing.point_features import check_points, interaction_rank
 from cdpr_drake.servoing.pose_features import (
     pose_feature_error,
     pose_interaction,
     theta_u_interaction,
 )
 from cdpr_drake.servoing.visual_features import DepthRule, columns, packed_sighting
-from tests.servoing.servo_cases import MAKERS, PACKED, RING, frontal, points, seen
+from tests.servoing.servo_cases import MAKERS, RING, frontal, points, seen
 
 ROUND_OFF = 1e-12
 STEP = 1e-6
@@ -117,23 +118,12 @@ def test_at_the_desired_pose_the_promised_motions_are_controlled(name):
         np.testing.assert_allclose(s, np.zeros(6), atol=ROUND_OFF)
 
 
-@pytest.mark.parametrize("name", PACKED)
-@pytest.mark.parametrize("depth", [DepthRule(), DepthRule("desired"), DepthRule("constant", 0.3)])
-def test_packed_features_are_the_features(name, depth):
-    features = MAKERS[name](X_CdO, depth)
-    packed = features.packed()
-    X_CO = pose_from_angles(np.array([0.02, -0.03, 0.2]), np.radians([170.0, 8.0, 160.0]))
-    sight = seen(name, X_CO)
-    s, L, row = np.empty(packed.size), np.empty((packed.size, 6)), packed_sighting(sight)
-    np.testing.assert_array_equal(row[:CENTER], columns(X_CO))
+def test_what_is_seen_is_packed_as_kernels_read_it():
+    sight = seen("ibvs", X_CdO)
+    row = packed_sighting(sight)
+    np.testing.assert_array_equal(row[:CENTER], columns(X_CdO))
+    np.testing.assert_array_equal(row[CENTER:MARKS], sight.center)
     np.testing.assert_array_equal(row[MARKS:], np.ravel(sight.marks))
-    packed.kernel(packed.numbers, row, s, L)
-    if packed.dropped >= 0:
-        s, L = np.delete(s, packed.dropped), np.delete(L, packed.dropped, axis=0)
-    expected = features.evaluate(sight)
-    np.testing.assert_allclose(s, expected[0], rtol=1e-13, atol=1e-15)
-    np.testing.assert_allclose(L, expected[1], rtol=1e-13, atol=1e-13)
-    assert feature_kernel(packed.kernel) != 0
 
 
 @pytest.mark.parametrize("name", ["ibvs", "2.5d", "circles"])
@@ -216,8 +206,10 @@ def test_points_on_a_line_control_five_motions_at_most(X_CO, count, seed):
     along = np.linspace(-0.1, 0.1, count) + 1e-3 * random.standard_normal(count)
     direction = np.array([np.cos(seed), np.sin(seed), 0.0])
     line = direction[:, np.newaxis] * along + 0.02 * random.standard_normal((3, 1))
-    p_CK = X_CO @ line
-    assert interaction_rank(points_interaction(p_CK[:2] / p_CK[2], p_CK[2])) <= 5
+    L = np.empty((2 * count, 6))
+    for k, (x, y, z) in enumerate((X_CO @ line).T):
+        point_into(x / z, y / z, z, L, 2 * k)
+    assert interaction_rank(L) <= 5
     with pytest.raises(VisualFeatureError, match="on one line, whose interaction matrix is singul"):
         check_points(line)
 

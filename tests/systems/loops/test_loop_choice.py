@@ -36,8 +36,8 @@ def test_a_long_run_takes_the_loop_unless_somebody_watches():
     chosen, words = set_loop(long)
     assert uses_compiled_loop(chosen)
     assert words == (
-        "acrobot_mobile_robot: by the compiled loop (its events in Python, since its tensions are "
-        "managed), as it lasts longer than 600 s; else with overrides integration.loop=diagram"
+        "acrobot_mobile_robot: by the compiled loop, as it lasts longer than 600 s; else "
+        "with overrides integration.loop=diagram"
     )
     shown, words = set_loop(long, watched=True)
     assert not uses_compiled_loop(shown)
