@@ -9,13 +9,15 @@ import pytest
 import yaml
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.design import search
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.analyses.design.search import SLOPES, evaluate_design, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.frame.follow import Follow
-from cdpr_drake.errors import CdprError, DesignError
+from cdpr_drake.analyses.frame.job import FinishedJob, ProcessDied
+from cdpr_drake.errors import CdprError, DesignError, SweepError
 from cdpr_drake.models.robot_loader import load_robot
 from tests.cli.commands import refuse, told
 
@@ -116,6 +118,13 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, settings, 
         more = kept(out, replace(settings, generations=4))
         assert len(more.values) == designs + 4
         assert more.earlier == designs
+
+
+def test_a_process_that_dies_ends_the_search_and_is_no_bad_design(monkeypatch):
+    died = FinishedJob(0, problem=ProcessDied("its process died"))
+    monkeypatch.setattr(search, "finished_jobs", lambda *_, **__: [died])
+    with pytest.raises(SweepError, match="its process died"):
+        searched(small("capacity-margin", search="slopes"))
 
 
 def test_slopes_find_a_better_design_than_evolution_with_more():
