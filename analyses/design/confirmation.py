@@ -12,7 +12,7 @@ from cdpr_drake.analyses.design.goals import (
     NEEDS_SPARE,
     GoalContext,
     can_close,
-    servo_stable,
+    share_of_stable_poses,
 )
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
@@ -86,9 +86,7 @@ def confirm(
     robots = [load_robot(name) for name in (original, design)]
     if goal == "csw":
         grid = between(judging.grid)
-        shares = [
-            float(np.mean(servo_stable(robot, replace(judging, grid=grid)))) for robot in robots
-        ]
+        shares = [share_of_stable_poses(robot, replace(judging, grid=grid)) for robot in robots]
         points = " x ".join(str(n) for n in grid.shape[1:])
         words = f"poses of a grid of {points}, each held and proven stable"
         return Confirmation(goal, words, "share", shares[0], shares[1])

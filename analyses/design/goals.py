@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES, conditions_at
+from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.analyses.workspaces.servo_stability import stability_case
 from cdpr_drake.arrays import Array
@@ -47,9 +47,6 @@ class GoalContext:
     bounds: PerturbationBounds
 
 
-Value = Callable[[Robot, GoalContext], float]
-
-
 @dataclass(frozen=True)
 class Goal:
     """Something that may be wanted.
@@ -57,44 +54,37 @@ class Goal:
     Attributes:
         title: What it is.
         unit: Its unit.
-        value: The number.
+        value: The number of a robot; None: that of a condition.
+        condition: Kind, as 0 and 1, or measure over the poses, 0 where it makes no sense.
+        combine: One number of these.
         smaller: Whether less of it is better.
         proven_as: Kind of `cdpr workspace --certify` that proves a volume; empty: none.
     """
 
     title: str
     unit: str
-    value: Value
+    value: Callable[[Robot, GoalContext], float] | None = None
+    condition: str = ""
+    combine: Callable[[Array], Any] = np.mean
     smaller: bool = False
     proven_as: str = ""
 
 
-def _over_poses(
-    robot: Robot, judging: GoalContext, name: str, combine: Callable[[Array], float]
-) -> float:
-    """Mean or least of a kind (as 0 and 1) or measure, which counts 0 where it makes no sense."""
-    about = pose_conditions(robot, required=judging.required)
-    arrays = conditions_at(about, judging.grid, [name], 0, judging.grid.size)
-    values = np.asarray(arrays[name], float)
-    return float(combine(np.where(np.isfinite(values), values, 0.0)))
-
-
-def _share(name: str, proven: bool = False) -> Goal:
+def _share(kind: str, proven: bool = False) -> Goal:
     """Share of the poses that are of a kind."""
-    title = f"share of poses: {KINDS[name].title}"
-    value = partial(_over_poses, name=name, combine=np.mean)
-    return Goal(title, "-", value, proven_as=name if proven else "")
+    title = f"share of poses: {KINDS[kind].title}"
+    return Goal(title, "-", condition=kind, proven_as=kind if proven else "")
 
 
-def _least(name: str) -> Goal:
+def _least(measure: str) -> Goal:
     """Least of a measure over the poses."""
-    value = partial(_over_poses, name=name, combine=np.min)
-    return Goal(f"least {MEASURES[name].title}", MEASURES[name].unit, value)
+    about = MEASURES[measure]
+    return Goal(f"least {about.title}", about.unit, condition=measure, combine=np.min)
 
 
-def servo_stable(robot: Robot, judging: GoalContext) -> np.ndarray:
-    """At which poses the platform can be held and position-based servoing is proven stable, shape
-    (n,)."""
+def share_of_stable_poses(robot: Robot, judging: GoalContext) -> float:
+    """Share of the poses where the platform can be held and position-based servoing is proven
+    stable."""
     grid = judging.grid
     case = stability_case(robot, "pbvs", grid)
     rows = grid.pose_rows(0, grid.size)
@@ -104,7 +94,7 @@ def servo_stable(robot: Robot, judging: GoalContext) -> np.ndarray:
     held = statically_feasible(
         about.case, grid.positions(0, grid.size), grid.rotations(0, grid.size)
     )
-    return np.asarray(stable & held, bool)
+    return float(np.mean(stable & held))
 
 
 def _accuracy(robot: Robot, judging: GoalContext) -> float:
@@ -138,8 +128,7 @@ GOALS: dict[str, Goal] = {
     },
     **{name: _share(name) for name in ("statically-stable", "singularity-free")},
     "csw": Goal(
-        "share of poses: held, and the visual servo is stable", "-",
-        lambda robot, judging: float(np.mean(servo_stable(robot, judging))),
+        "share of poses: held, and the visual servo is stable", "-", share_of_stable_poses
     ),
     **{
         name: _least(name)
@@ -148,12 +137,10 @@ GOALS: dict[str, Goal] = {
     "survives": _share("single-failure", proven=True),
     "breaks-survived": Goal(
         "mean number of single breaks after which the weight is held", "-",
-        partial(_over_poses, name="breaks-survived", combine=np.mean),
+        condition="breaks-survived",
     ),
-    "tension-factor": Goal(
-        "mean tension factor", "-", partial(_over_poses, name="tension-factor", combine=np.mean)
-    ),
-    "payload": Goal("least payload", "kg", _least("payload").value),
+    "tension-factor": Goal("mean tension factor", "-", condition="tension-factor"),
+    "payload": Goal("least payload", "kg", condition="payload", combine=np.min),
     "accuracy": Goal(
         "rms error of the position, exit points off by 1 mm", "m", _accuracy, smaller=True
     ),
@@ -210,8 +197,3 @@ def check_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> Non
 def goal_signs(names: Sequence[str]) -> Array:
     """1 of goals of which more is better, -1 of others, shape (n,)."""
     return np.array([-1.0 if GOALS[name].smaller else 1.0 for name in names])
-
-
-def evaluate_goals(robot: Robot, judging: GoalContext, names: Sequence[str]) -> Array:
-    """Values of goals, larger is better: those of which less is better with the sign changed."""
-    return np.array([GOALS[name].value(robot, judging) for name in names]) * goal_signs(names)

@@ -14,11 +14,11 @@ from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.design_result import Design
-from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals, goal_signs
+from cdpr_drake.analyses.design.goals import GOALS, check_goals, goal_signs
 from cdpr_drake.analyses.design.search import (
     SLOPES,
     Slopes,
-    evaluate_original,
+    evaluate_design,
     goal_context,
     scores_of,
     search_design,
@@ -85,8 +85,8 @@ class DesignProgram(OwnTerms):
             number: Number of the set of cables, from 0.
 
         Raises:
-            CdprError: As `make_candidates` and `evaluate_original`; nothing may move; a goal is a
-                count; there is no such set.
+            CdprError: As `make_candidates`, `check_goals` and `evaluate_design`; nothing may move;
+                a goal is a count; there is no such set.
         """
         self.robot, self.settings, self.number = robot, settings, number
         name = robot.name if isinstance(robot, Robot) else robot
@@ -100,7 +100,8 @@ class DesignProgram(OwnTerms):
         self._goals = settings.goal_names
         self._refuse_counts(self._goals)
         self.judging = goal_context(robot, settings)
-        self._original = evaluate_original(self.candidates, self.judging, self._goals)
+        check_goals(self.candidates.present, self.judging, self._goals)
+        self._original = evaluate_design(self.candidates, self.judging, self._goals)
         self._goal_at = lru_cache(MOST_KEPT)(self._goal_of_bytes)
         self._first = self.candidates.points.size
         self._lows, self._highs = np.array([*self.candidates.ranges.values()]).reshape(-1, 2).T
@@ -193,7 +194,7 @@ class DesignProgram(OwnTerms):
         x, solver, status = self._solve_whole(start, "a design")
         designs = np.array([self._shares(start[places]), self._shares(np.clip(x[places], 0, 1))])
         values = np.array([
-            evaluate_goals(self.candidates.robot(self.number, design), self.judging, self._goals)
+            evaluate_design(self.candidates, self.judging, self._goals, (self.number, design))
             for design in designs
         ])  # fmt: skip
         return Design(
@@ -228,8 +229,9 @@ class DesignProgram(OwnTerms):
         return self._goal_at(goal, z.tobytes())
 
     def _goal_of_bytes(self, goal: str, z: bytes) -> float:
-        robot = self.candidates.robot(self.number, self._shares(np.frombuffer(z)))
-        return GOALS[goal].value(robot, self.judging)
+        design = self.number, self._shares(np.frombuffer(z))
+        values = evaluate_design(self.candidates, self.judging, [goal], design)
+        return float((values * goal_signs([goal]))[0])
 
     def _refuse_counts(self, goals: Sequence[str]) -> None:
         smooth = [name for name in GOALS if name not in STEPPED]

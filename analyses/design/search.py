@@ -16,22 +16,23 @@ import time
 from collections.abc import Callable, Generator, Sequence
 from functools import cache, partial
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 from scipy.optimize import linprog
 
 from cdpr_drake.analyses.design.candidates import Candidates
 from cdpr_drake.analyses.design.design_result import Design
-from cdpr_drake.analyses.design.goals import GoalContext, check_goals, evaluate_goals
+from cdpr_drake.analyses.design.goals import GOALS, GoalContext, check_goals, goal_signs
 from cdpr_drake.analyses.design.settings import BY_SLOPES, DesignSettings
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow
+from cdpr_drake.analyses.frame.job import FinishedJob
 from cdpr_drake.analyses.frame.jobs import Processes, finished_jobs
+from cdpr_drake.analyses.workspaces.conditions import CONDITIONS, Poses
 from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.analyses.workspaces.stability_defaults import workspace_defaults
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, DesignError, install_words
+from cdpr_drake.errors import CdprError, DesignError, SweepError, install_words
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.json_text import load_json
@@ -96,14 +97,33 @@ def scores_of(values: Array, original: Array, settings: DesignSettings) -> Array
     return np.asarray(values, float) / size @ weights
 
 
-def evaluate_original(candidates: Candidates, judging: GoalContext, names: Sequence[str]) -> Array:
-    """Goals of the robot as it is, with all its cables, larger is better.
+def evaluate_design(
+    candidates: Candidates, judging: GoalContext, names: Sequence[str],
+    design: tuple[int, Array] | None = None,
+) -> Array:  # fmt: skip
+    """Values of goals, larger is better: those of which less is better with the sign changed.
+
+    Args:
+        candidates: The designs that there may be.
+        judging: What they are judged by.
+        names: Names of `GOALS`.
+        design: Number of a set of cables, and coordinates; None: the robot as it is.
 
     Raises:
-        CdprError: It cannot be asked for a goal; says why.
+        CdprError: There is no such robot, or it cannot be asked.
     """
-    check_goals(candidates.present, judging, names)
-    return evaluate_goals(candidates.present, judging, names)
+    robot = candidates.present if design is None else candidates.robot(*design)
+    grid, values = judging.grid, []
+    at = Poses(0, grid.size, grid.positions(0, grid.size), grid.rotations(0, grid.size))
+    for name in names:
+        goal = GOALS[name]
+        if goal.value is not None:
+            values.append(goal.value(robot, judging))
+            continue
+        about = pose_conditions(robot, required=judging.required)
+        numbers = np.asarray(CONDITIONS[goal.condition].value(about, at), float)
+        values.append(goal.combine(np.where(np.isfinite(numbers), numbers, 0.0)))
+    return np.array(values, float) * goal_signs(names)
 
 
 def search_design(
@@ -134,29 +154,78 @@ def search_design(
             f"search: found slopes for {', '.join(names)}; accepted with slopes: one goal of "
             f"{', '.join(SLOPES)}"
         )
-    judge = _Judge(candidates, settings, judging, folder, workers, follow)
-    began = time.perf_counter()
+    check_goals(candidates.present, judging, names)
+    original = evaluate_design(candidates, judging, names)
+    goals = _read(folder)
     size, most = candidates.size, settings.generations if candidates.size else 1
     population = settings.population or 4 + math.floor(3 * math.log(max(size, 1)))  # as Hansen
-    judge.expect(len(candidates.cable_sets) * most * (population if size and not by_slopes else 1))
-    complete = True
-    with judge.processes:
+    total = len(candidates.cable_sets) * most * (population if size and not by_slopes else 1)
+    counter = Count(follow, total, min(len(goals), total), unit="designs")
+    score = partial(scores_of, original=original, settings=settings)
+    say = cache(follow.say)  # words of a cluster once, not in each generation
+    work = partial(evaluate_design, candidates, judging, names)
+    began, best, earlier, complete = time.perf_counter(), -np.inf, 0, True
+    sets: list[int] = []
+    designs: list[Array] = []
+    values: list[Array] = []
+    with Processes() as standing:
         for number in range(len(candidates.cable_sets)):
             if by_slopes and size:
                 slopes_at = partial(SLOPES[names[0]], candidates, number, judging)
                 search, word = climb(size, most, slopes_at), "step"
             else:
-                search = evolve(size, population, most, settings.seed, judge.scores)
+                search = evolve(size, population, most, settings.seed, score)
                 word = "generation"
-            complete = judge.follow_search(search, f"set{number}-{word}", number, most)
+            X = next(search)
+            for k in count():
+                name = f"set{number}-{word}{k:04d}"
+                keys = [f"{name}-{j}" for j in range(len(X))]
+                lacking = [j for j, key in enumerate(keys) if key not in goals]
+                earlier += len(X) - len(lacking)
+                for job in finished_jobs(
+                    work, [(number, X[j]) for j in lacking], workers, stop=follow.stop, say=say,
+                    name="design", standing=standing,
+                ):  # fmt: skip
+                    key = keys[lacking[job.number]]
+                    goals[key] = _goals(job, len(names))
+                    if folder is not None:
+                        with folder.writing(), folder.claim(JUDGED).open("a") as file:
+                            file.write(json.dumps([key, goals[key]]) + "\n")
+                    counter.add(1, f"best {best:.4g}" if np.isfinite(best) else name)
+                complete = all(key in goals for key in keys)
+                if not complete:
+                    break
+                rows = np.array([goals[key] for key in keys], float).reshape(len(X), -1)
+                sets += [number] * len(X)
+                designs += list(X)
+                values += list(rows)
+                best = max([best, *score(rows)[np.all(np.isfinite(rows), axis=1)]])
+                try:
+                    X = search.send(rows)
+                except StopIteration:
+                    counter.total -= most - k - 1
+                    break
             if not complete:
                 break
-    values = np.array(judge.values).reshape(-1, len(names))
+    all_values = np.array(values).reshape(-1, len(names))
     return Design(
-        candidates, settings, judging, judge.original, np.array(judge.sets, int),
-        np.array(judge.designs).reshape(-1, size), values, judge.scores(values), complete,
-        judge.earlier, time.perf_counter() - began,
+        candidates, settings, judging, original, np.array(sets, int),
+        np.array(designs).reshape(-1, size), all_values, score(all_values), complete, earlier,
+        time.perf_counter() - began,
     )  # fmt: skip
+
+
+def _goals(job: FinishedJob[Array], count: int) -> list[float]:
+    """Goals of a judged design; NaN where it is no robot, or one that cannot be asked.
+
+    Raises:
+        SweepError: Its process died, or the cluster cannot be used.
+    """
+    if job.problem is None and job.result is not None:
+        return [float(value) for value in job.result]
+    if isinstance(job.problem, CdprError) and not isinstance(job.problem, SweepError):
+        return [math.nan] * count
+    raise job.problem or SweepError("design: found no goals")
 
 
 Search = Generator[Array, Array, None]
@@ -279,94 +348,15 @@ SLOPES: dict[str, Slopes] = {"capacity-margin": _capacity_margin}
 """By names of goals."""
 
 
-def judged(
-    candidates: Candidates, names: Sequence[str], judging: GoalContext, design: tuple[int, Array]
-) -> list[float]:
-    """Goals of a design, a set of cables and coordinates, larger is better; NaN if it cannot be."""
+def _read(folder: Folder | None) -> dict[str, list[float]]:
+    """Goals by keys of designs that an earlier search of a folder has judged."""
+    if folder is None or not folder.resumed or not (folder.path / JUDGED).exists():
+        return {}
+    lines = (folder.path / JUDGED).read_text(encoding="utf-8").splitlines(keepends=True)
+    lines = [line for line in lines if line.endswith("\n")]  # a kill may have cut the last one
+    folder.write_text(JUDGED, "".join(lines))
     try:
-        return evaluate_goals(candidates.robot(*design), judging, names).tolist()
-    except CdprError:  # no robot at all, or one that cannot be asked
-        return [np.nan] * len(names)
-
-
-class _Judge:
-    """Judges designs, each of them once, and keeps the goals of all in the folder."""
-
-    def __init__(
-        self, candidates: Candidates, settings: DesignSettings, judging: GoalContext,
-        folder: Folder | None, workers: int | str | None, follow: Follow,
-    ) -> None:  # fmt: skip
-        names = settings.goal_names
-        self.original = evaluate_original(candidates, judging, names)
-        self.sets: list[int] = []
-        self.designs: list[Array] = []
-        self.values: list[Array] = []
-        self.earlier = 0
-        self.processes = Processes()
-        self.scores = partial(scores_of, original=self.original, settings=settings)
-        self._work = partial(judged, candidates, names, judging)
-        self._folder, self._workers, self._follow, self._best = folder, workers, follow, -np.inf
-        self._say = cache(follow.say)  # words of a cluster once, not in each generation
-        self._goals: dict[str, list[float]] = {}
-        if folder is not None and folder.resumed:
-            self._goals = _read(folder.path / JUDGED)
-        if folder is not None and self._goals:  # without a line that a kill has cut
-            lines = (json.dumps(item) + "\n" for item in self._goals.items())
-            folder.write_text(JUDGED, "".join(lines))
-
-    def expect(self, total: int) -> None:
-        """Begins to count that many designs."""
-        self._count = Count(self._follow, total, min(len(self._goals), total), unit="designs")
-
-    def follow_search(self, search: Search, name: str, number: int, most: int) -> bool:
-        """Judges all that a search of a set of cables asks for; False if it was stopped."""
-        X = next(search)
-        for k in count():
-            values = self._judge(f"{name}{k:04d}", number, X)
-            if values is None:
-                return False
-            try:
-                X = search.send(values)
-            except StopIteration:
-                self._count.total -= most - k - 1
-                break
-        return True
-
-    def _judge(self, name: str, number: int, X: Array) -> Array | None:
-        """Goals of designs, shape (n, goals); None if it was stopped before all were judged."""
-        keys = [f"{name}-{k}" for k in range(len(X))]
-        lacking = [k for k, key in enumerate(keys) if key not in self._goals]
-        self.earlier += len(X) - len(lacking)
-        for finished in finished_jobs(
-            self._work, [(number, X[k]) for k in lacking], self._workers, stop=self._follow.stop,
-            say=self._say, name="design", standing=self.processes,
-        ):  # fmt: skip
-            if finished.problem is not None:
-                raise finished.problem
-            self._keep(keys[lacking[finished.number]], finished.result or [])
-            best = f"best {self._best:.4g}" if np.isfinite(self._best) else name
-            self._count.add(1, best)
-        if not all(key in self._goals for key in keys):
-            return None
-        values = np.array([self._goals[key] for key in keys], float).reshape(len(X), -1)
-        self.sets += [number] * len(X)
-        self.designs += list(X)
-        self.values += list(values)
-        finite = np.all(np.isfinite(values), axis=1)
-        self._best = max([self._best, *self.scores(values)[finite]])
-        return values
-
-    def _keep(self, key: str, goals: list[float]) -> None:
-        self._goals[key] = goals
-        if self._folder is not None:
-            with self._folder.writing(), self._folder.claim(JUDGED).open("a") as file:
-                file.write(json.dumps([key, goals]) + "\n")
-
-
-def _read(path: Path) -> dict[str, list[float]]:
-    """Goals of judged designs by their keys; a line that a kill has cut does not count."""
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True) if path.exists() else []
-    try:
-        return dict(load_json(line) for line in lines if line.endswith("\n"))
+        return dict(load_json(line) for line in lines)
     except (ValueError, TypeError) as problem:
-        raise DesignError(f"{path}: found no lines of a search: {problem}") from problem
+        where = folder.path / JUDGED
+        raise DesignError(f"{where}: found no lines of a search: {problem}") from problem

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
+from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, portable_job
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.blas_threads import one_blas_thread
 from cdpr_drake.errors import SweepError, install_words
@@ -287,7 +287,7 @@ def do_batch(
     share_compilation()
     began = time.perf_counter()
     with one_blas_thread():
-        finished = [portable(do_job(work, job, number)) for number, job in jobs]
+        finished = [portable_job(work, job, number) for number, job in jobs]
     return time.perf_counter() - began, finished
 
 

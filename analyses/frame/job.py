@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from cdpr_drake.errors import SweepError
 
@@ -44,22 +44,22 @@ class ProcessDied(SweepError):
     """The process of a job died, for instance because memory ran out."""
 
 
-def do_job(work: Callable[[Job], Result], job: Job, number: int) -> FinishedJob[Result]:
-    """Does a job in this process; what it raises is its problem."""
+def failed_job(number: int, problem: BaseException) -> FinishedJob[Any]:
+    """A job that raised; one that asks to exit ends neither its process nor a worker."""
+    if not isinstance(problem, Exception):
+        problem = SweepError(f"{type(problem).__name__}: {problem}")
+    return FinishedJob(number, problem=problem)
+
+
+def portable_job(work: Callable[[Job], Result], job: Job, number: int) -> FinishedJob[Result]:
+    """Does a job for another process: what does not pickle becomes a problem in words."""
     try:
-        return FinishedJob(number, work(job))
-    except Exception as problem:
-        return FinishedJob(number, problem=problem)
-    except SystemExit as end:  # else a worker of a cluster ends, and others do the job again
-        return FinishedJob(number, problem=SweepError(f"SystemExit: {end}"))
-
-
-def portable(finished: FinishedJob[Result]) -> FinishedJob[Result]:
-    """The same for another process: what does not pickle becomes a problem in words."""
+        finished = FinishedJob(number, work(job))
+    except (Exception, SystemExit) as problem:
+        finished = failed_job(number, problem)
     try:
         pickle.loads(pickle.dumps(finished))
         return finished
     except Exception as unpicklable:
-        problem = finished.problem or unpicklable
-        words = f"{type(problem).__name__}: {problem}"
-        return FinishedJob(finished.number, problem=SweepError(words))
+        why = finished.problem or unpicklable
+        return FinishedJob(number, problem=SweepError(f"{type(why).__name__}: {why}"))

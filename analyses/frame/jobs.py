@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from typing import Any, Self, TypeVar
 
-from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, do_job, portable
+from cdpr_drake.analyses.frame.job import POLL, FinishedJob, ProcessDied, failed_job, portable_job
 from cdpr_drake.blas_threads import one_blas_thread, started_with_one_thread
 from cdpr_drake.errors import SweepError
 from cdpr_drake.kernel_cache.locks import compilation_time, share_compilation
@@ -83,7 +83,10 @@ def finished_jobs(
         began, compiled = time.perf_counter(), compilation_time()
         number = waiting.popleft()
         with one_blas_thread():
-            finished = do_job(work, jobs[number], number)
+            try:
+                finished = FinishedJob(number, work(jobs[number]))
+            except (Exception, SystemExit) as problem:
+                finished = failed_job(number, problem)
         passed = time.perf_counter() - began - (compilation_time() - compiled)
         yield finished
         if count > 1 and passed * len(waiting) > WORTH_PROCESSES:
@@ -191,5 +194,4 @@ def _serve(connection: Connection[Any, Any], work: Callable[[Any], Any]) -> None
     with suppress(EOFError):  # the parent has no more jobs
         while True:
             number, job = connection.recv()
-            finished = portable(do_job(work, job, number))
-            connection.send(finished)
+            connection.send(portable_job(work, job, number))

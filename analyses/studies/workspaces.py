@@ -174,7 +174,7 @@ def poses_row(about: PoseConditions, grid: WorkspaceGrid, kinds: Sequence[str]) 
     """Where kinds hold: points along each axis; kinds; holds_KIND, shape (nx, ny, nz); x_m, y_m,
     z_m, of the grid."""
     chunks = [
-        conditions_at(about, grid, kinds, k, min(k + CHUNK, grid.size))
+        conditions_at(about, grid, kinds, (k, min(k + CHUNK, grid.size)))
         for k in range(0, grid.size, CHUNK)
     ]
     shape = grid.shape[1:]

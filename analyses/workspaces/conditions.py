@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.stability.verdict import judge_stability
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 from cdpr_drake.workspaces.cable_interference import Surroundings, clearances
@@ -158,7 +160,7 @@ class Kind:
     """
 
     title: str
-    holds: Callable[[PoseConditions, Poses], np.ndarray]
+    value: Callable[[PoseConditions, Poses], np.ndarray]
     needs: str = ""
 
 
@@ -205,8 +207,10 @@ def _visible(about: PoseConditions, at: Poses) -> np.ndarray:
 
 
 def _stable(about: PoseConditions, at: Poses) -> np.ndarray:
-    assert about.stable is not None
-    return about.stable(at.start, at.stop)["stable"]
+    servo = about.stable
+    assert servo is not None
+    poses = servo.grid.pose_rows(at.start, at.stop)
+    return judge_stability(servo.case, servo.bounds, poses, servo.verdict, servo.options).stable
 
 
 def _of_breaks(name: str) -> Callable[[PoseConditions, Poses], np.ndarray]:
@@ -217,42 +221,35 @@ def _of_breaks(name: str) -> Callable[[PoseConditions, Poses], np.ndarray]:
     return of_breaks
 
 
-def _at(function: Callable[..., Any]) -> Callable[[PoseConditions, Poses], Any]:
-    """A number that depends on the platform and its load only."""
-    return lambda about, at: function(about.case, at.positions, at.rotations)
-
-
-def _with_breaks(function: Callable[..., Any]) -> Callable[[PoseConditions, Poses], Any]:
-    """A number after any one cable broke, of the load and the required wrenches."""
-    return lambda about, at: function(about.case, at.positions, at.rotations, about.required)
-
-
 KINDS: dict[str, Kind] = {
     "static": Kind("the weight can be held", _static),
     "wrench-feasible": Kind("every required wrench can be held", _wrench_feasible, "required"),
     "dynamic": Kind("every acceleration can be had", _dynamic, "motion"),
     "wrench-closure": Kind(
         "tensions without upper limit balance every wrench",
-        _at(lambda *poses: closure_margins(*poses) > 0.0),
+        lambda about, at: closure_margins(about.case, at.positions, at.rotations) > 0.0,
     ),
     "single-failure": Kind(
         "weight and required wrenches can be held with any one cable broken",
-        _with_breaks(survives_breaks),
+        lambda about, at: survives_breaks(
+            about.case, at.positions, at.rotations, about.required
+        ),
     ),
     "statically-stable": Kind(
         "held with a regular Jacobian and a positive definite stiffness",
-        _at(lambda *poses: stiffness_at(*poses).stable),
+        lambda about, at: stiffness_at(about.case, at.positions, at.rotations).stable,
     ),
     "singularity-free": Kind(
-        f"the dexterity is above {REGULAR:g}", _at(lambda *poses: dexterities(*poses) > REGULAR)
+        f"the dexterity is above {REGULAR:g}",
+        lambda about, at: dexterities(about.case, at.positions, at.rotations) > REGULAR,
     ),
     "interference-free": Kind(
         "cables touch neither each other nor platform, frame or obstacles",
-        lambda about, at: _far(about, at, slice(0, 4)),
+        partial(_far, parts=slice(0, 4)),
     ),
     "collision-free": Kind(
         "the platform touches neither frame nor obstacles",
-        lambda about, at: _far(about, at, slice(4, 5)),
+        partial(_far, parts=slice(4, 5)),
     ),
     "target-visible": Kind("the camera sees the target", _visible, "view"),
     SURVIVES: Kind(
@@ -281,26 +278,35 @@ MEASURES: dict[str, Measure] = {
     "capacity-margin": Measure("capacity margin", "N", _capacity),
     "breaks-survived": Measure(
         "single breaks after which all is held", "-",
-        _with_breaks(lambda *poses: breaks_survived(*poses).astype(float)),
+        lambda about, at: breaks_survived(
+            about.case, at.positions, at.rotations, about.required
+        ).astype(float),
     ),
     "failure-margin": Measure(
-        "least capacity margin with any one cable broken", "N", _with_breaks(break_margins)
+        "least capacity margin with any one cable broken", "N",
+        lambda about, at: break_margins(about.case, at.positions, at.rotations, about.required),
     ),
     EXCURSION: Measure(
         "largest excursion by the best reaction to the worst break", "m", _of_breaks(EXCURSION)
     ),
     WORST: Measure("cable whose break is worst", "number", _of_breaks(WORST)),
     BEST: Measure("best reaction to that", "number", _of_breaks(BEST)),
-    "tension-factor": Measure("tension factor", "-", _at(tension_factors)),
+    "tension-factor": Measure(
+        "tension factor", "-",
+        lambda about, at: tension_factors(about.case, at.positions, at.rotations),
+    ),
     "payload": Measure(
         "largest payload", "kg",
         lambda about, at: largest_payloads(about.case, at.positions, at.rotations, about.gravity),
     ),
     "stiffness": Measure(
-        "smallest stiffness", "N/m", _at(lambda *poses: stiffness_at(*poses).smallest)
+        "smallest stiffness", "N/m",
+        lambda about, at: stiffness_at(about.case, at.positions, at.rotations).smallest,
     ),
     "frequency": Measure("first natural frequency", "Hz", _frequency),
-    "dexterity": Measure("dexterity", "-", _at(dexterities)),
+    "dexterity": Measure(
+        "dexterity", "-", lambda about, at: dexterities(about.case, at.positions, at.rotations)
+    ),
     "clearance": Measure(
         "clearance", "m",
         lambda about, at: np.min(clearances(about.around, at.positions, at.rotations), axis=1),
@@ -309,13 +315,16 @@ MEASURES: dict[str, Measure] = {
 """Measures of a pose by name."""
 
 
+CONDITIONS: dict[str, Kind | Measure] = {**KINDS, **MEASURES}
+
+
 def conditions_at(
-    about: PoseConditions, grid: WorkspaceGrid, names: Iterable[str], start: int, stop: int
+    about: PoseConditions, grid: WorkspaceGrid, names: Iterable[str], span: tuple[int, int]
 ) -> dict[str, np.ndarray]:
-    """Kinds and measures at the poses start to stop of a grid, by name, shape (n,)."""
-    at = Poses(start, stop, grid.positions(start, stop), grid.rotations(start, stop))
-    broken = {} if about.breaks is None else about.breaks(start, stop)  # once for all of them
-    return broken | {
-        name: KINDS[name].holds(about, at) if name in KINDS else MEASURES[name].value(about, at)
-        for name in names if name not in broken
-    }  # fmt: skip
+    """Kinds and measures at the poses of a span of a grid, by name, shape (n,)."""
+    at = Poses(*span, grid.positions(*span), grid.rotations(*span))
+    arrays = {} if about.breaks is None else about.breaks(*span)  # once for all of them
+    for name in names:
+        if name not in arrays:
+            arrays[name] = CONDITIONS[name].value(about, at)
+    return arrays

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
 from cdpr_drake.analyses.frame.follow import Count, Follow
-from cdpr_drake.analyses.frame.jobs import finished_jobs
+from cdpr_drake.analyses.frame.job import FinishedJob
 from cdpr_drake.analyses.frame.result import STOPPED, Result
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.output_folder import shown_path
@@ -37,61 +36,68 @@ CHUNKS = "chunks"
 POSES = "poses"
 """Word for what is counted."""
 
-PoseArrays = Callable[[int, int], Mapping[str, np.ndarray]]
-"""Arrays by name, whose first index counts the poses start to stop of a grid."""
+Span = tuple[int, int]
+"""Poses of a grid by number: from the first to before the second."""
 
 
-def run_grid(
-    work: PoseArrays, count: int, chunk: int, folder: Folder | None, workers: int | str | None,
-    follow: Follow,
-) -> dict[str, np.ndarray]:  # fmt: skip
-    """Arrays over all poses of a grid; their numbers depend neither on chunks nor on workers.
+class Chunks:
+    """Arrays over all poses of a grid, which come in chunks; no number depends on these.
 
-    Args:
-        work: Computes the arrays of some poses; it pickles.
-        count: Number of poses.
-        chunk: Poses of a chunk: seconds of work at most. Finished chunks are kept in the folder.
-        folder: The results folder; None: nothing is kept.
-        workers: As `finished_jobs`.
-        follow: Who follows.
-
-    Raises:
-        StoppedError: It was stopped.
-        CdprError: As the work.
-        SweepError: The cluster cannot be used, or a process died.
+    Attributes:
+        missing: Spans of the chunks that the folder has not.
     """
-    spans = [(start, min(start + chunk, count)) for start in range(0, count, chunk)]
-    chunks: dict[tuple[int, int], Mapping[str, np.ndarray]] = {}
-    for span in spans:
-        stored = None if folder is None else load_arrays(folder.path / _file(span))
-        if stored is not None:
-            chunks[span] = stored
-    jobs = [span for span in spans if span not in chunks]
-    counter = Count(follow, count, sum(stop - start for start, stop in chunks), POSES)
-    do = partial(chunk_arrays, work)
-    for done in finished_jobs(do, jobs, workers, stop=follow.stop, say=follow.say, name=POSES):
-        if done.problem is not None:
-            raise done.problem if isinstance(done.problem, CdprError) else SweepError(done.words())
-        span, arrays = jobs[done.number], done.result or {}
-        if folder is not None:
-            folder.write_arrays(_file(span), arrays)
-        chunks[span] = arrays
-        counter.add(span[1] - span[0], POSES)
-    if counter.done < count:
-        words = f"stopped after {counter.done:.0f} of {count} {POSES}"
-        words += "" if folder is None else f"; the same command goes on in {folder.path}"
-        raise StoppedError(words)
-    return {
-        name: np.concatenate([chunks[span][name] for span in spans]) for name in chunks[spans[0]]
-    }
+
+    def __init__(self, count: int, chunk: int, folder: Folder | None, follow: Follow) -> None:
+        """Reads what the folder has.
+
+        Args:
+            count: Number of poses.
+            chunk: Poses of a chunk: seconds of work at most.
+            folder: Keeps finished chunks; None: nothing is kept.
+            follow: Who follows.
+        """
+        self._spans = [(start, min(start + chunk, count)) for start in range(0, count, chunk)]
+        self._chunks: dict[Span, Mapping[str, np.ndarray]] = {}
+        for span in self._spans:
+            stored = None if folder is None else load_arrays(folder.path / _file(span))
+            if stored is not None:
+                self._chunks[span] = stored
+        self.missing = [span for span in self._spans if span not in self._chunks]
+        finished = sum(stop - start for start, stop in self._chunks)
+        self._folder, self._count = folder, Count(follow, count, finished, POSES)
+
+    def add(self, job: FinishedJob[dict[str, np.ndarray]]) -> None:
+        """Keeps a chunk of `missing`: arrays by name, whose first index counts its poses.
+
+        Raises:
+            CdprError: As the work.
+            SweepError: The work failed otherwise, or its process died.
+        """
+        if job.problem is not None:
+            raise job.problem if isinstance(job.problem, CdprError) else SweepError(job.words())
+        span, arrays = self.missing[job.number], job.result or {}
+        if self._folder is not None:
+            self._folder.write_arrays(_file(span), arrays)
+        self._chunks[span] = arrays
+        self._count.add(span[1] - span[0], POSES)
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The arrays over all poses.
+
+        Raises:
+            StoppedError: Chunks are missing, as the work was stopped.
+        """
+        if self._count.done < self._count.total:
+            words = f"stopped after {self._count.done:.0f} of {self._count.total} {POSES}"
+            words += f"; the same command goes on in {self._folder.path}" if self._folder else ""
+            raise StoppedError(words)
+        return {
+            name: np.concatenate([self._chunks[span][name] for span in self._spans])
+            for name in self._chunks[self._spans[0]]
+        }
 
 
-def chunk_arrays(work: PoseArrays, span: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Arrays of the poses of a chunk."""
-    return dict(work(*span))
-
-
-def _file(span: tuple[int, int]) -> str:
+def _file(span: Span) -> str:
     return f"{CHUNKS}/{POSES}-{span[0]:07d}-{span[1]:07d}.npz"
 
 

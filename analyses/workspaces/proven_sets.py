@@ -270,7 +270,7 @@ def _judged(
 ) -> dict[str, np.ndarray]:
     at = Poses(0, len(positions), positions, rotations)
     names = dict.fromkeys([*kinds, "collision-free"])
-    return {name: KINDS[name].holds(about, at) for name in names}
+    return {name: KINDS[name].value(about, at) for name in names}
 
 
 def explain_pose(sets: ProvenSets, pose: Array) -> str:

@@ -24,7 +24,7 @@ from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.stability.desired_view import FixedObject, OppositeCorner, ServoTarget
 from cdpr_drake.stability.perturbation_bounds import BOUNDS, PerturbationBounds
 from cdpr_drake.stability.stability_case import OBJECT_POSE_MODELS, StabilityCase
-from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions, judge_stability
+from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
 if TYPE_CHECKING:
@@ -53,19 +53,13 @@ the camera [m]."""
 
 @dataclass(frozen=True, eq=False)
 class ServoStability:
-    """A verdict on the servo of a case at the poses of a grid, under bounds of perturbations."""
+    """What judges the servo of a case at the poses of a grid, under bounds of perturbations."""
 
     case: StabilityCase
     bounds: PerturbationBounds
     grid: WorkspaceGrid
     options: VerdictOptions = VerdictOptions()  # noqa: RUF009, it is frozen
     verdict: str = "searched"
-
-    def __call__(self, start: int, stop: int) -> dict[str, np.ndarray]:
-        """Arrays `stable` and `margin` of the poses start to stop, shape (n,)."""
-        poses = self.grid.pose_rows(start, stop)
-        judged = judge_stability(self.case, self.bounds, poses, self.verdict, self.options)
-        return {"stable": judged.stable, "margin": judged.margin}
 
 
 @dataclass(frozen=True, eq=False)

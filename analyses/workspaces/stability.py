@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -34,12 +35,14 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.workspaces.grid_runs import (
+    POSES,
+    Chunks,
     GridResult,
+    Span,
     grid_words,
     load_grid,
     region_numbers,
     reused,
-    run_grid,
 )
 from cdpr_drake.analyses.workspaces.pose_grid import (
     Grid,
@@ -63,7 +66,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_wrench
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds
 from cdpr_drake.stability.stability_case import SCHEMES
-from cdpr_drake.stability.verdict import VERDICTS, VerdictOptions
+from cdpr_drake.stability.verdict import VERDICTS, StabilityChunk, VerdictOptions, judge_stability
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -314,10 +317,14 @@ def assess_stability(
         servos = [replace(servo, bounds=each) for each in named.values()]
         work = partial(judged_poses, held, servos)
         chunk = max(CHUNK_POSES[verdict] // len(set(named.values())), 1)
-        arrays = run_grid(work, poses.size, chunk, results, workers, follow)
+        chunks = Chunks(poses.size, chunk, results, follow)
+        for job in finished_jobs(
+            work, chunks.missing, workers, stop=follow.stop, say=follow.say, name=POSES
+        ):
+            chunks.add(job)
         # The poses come first in these arrays, then the bounds.
         shaped: dict[str, Any] = {name: array.T.reshape(*array.shape[1:], *poses.shape)
-                  for name, array in arrays.items()}  # fmt: skip
+                  for name, array in chunks.arrays().items()}  # fmt: skip
         result = Stability(arguments=arguments, grid=poses, robot=loaded, **shaped)
         if results is not None:
             result.save(results)
@@ -325,21 +332,23 @@ def assess_stability(
 
 
 def judged_poses(
-    held: StaticCase, servos: Sequence[ServoStability], start: int, stop: int
+    held: StaticCase, servos: Sequence[ServoStability], span: Span
 ) -> dict[str, np.ndarray]:
-    """Arrays of the poses start to stop of a grid.
+    """Arrays of some poses of a grid.
 
     `feasible`, shape (n,), see servoing thesis (1.25); `stable` and `margin` under the bounds of
     each servo, shape (n, b). Equal bounds are judged once.
     """
-    grid = servos[0].grid
-    feasible = statically_feasible(held, grid.positions(start, stop), grid.rotations(start, stop))
-    judged: dict[PerturbationBounds, dict[str, np.ndarray]] = {}
+    grid, poses = servos[0].grid, servos[0].grid.pose_rows(*span)
+    feasible = statically_feasible(held, grid.positions(*span), grid.rotations(*span))
+    judged: dict[PerturbationBounds, StabilityChunk] = {}
     for servo in servos:
         if servo.bounds not in judged:
-            judged[servo.bounds] = servo(start, stop)
+            judged[servo.bounds] = judge_stability(
+                servo.case, servo.bounds, poses, servo.verdict, servo.options
+            )
     columns = {
-        name: np.stack([judged[servo.bounds][name] for servo in servos], axis=1)
+        name: np.stack([getattr(judged[servo.bounds], name) for servo in servos], axis=1)
         for name in ("stable", "margin")
     }
     return {"feasible": feasible, **columns}

@@ -14,6 +14,7 @@ from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.folder import results_folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
+from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
     DEFAULT_FORMATS,
@@ -49,7 +50,7 @@ from cdpr_drake.analyses.workspaces.conditions import (
     PoseConditions,
     conditions_at,
 )
-from cdpr_drake.analyses.workspaces.grid_runs import reused, run_grid
+from cdpr_drake.analyses.workspaces.grid_runs import POSES, Chunks, reused
 from cdpr_drake.analyses.workspaces.pose_grid import (
     Grid,
     Orientations,
@@ -250,8 +251,12 @@ def compute_workspace(
             chunk = min((CHUNKS[kind] for kind in kinds if kind in CHUNKS), default=CHUNK)
             chunk = CHUNKS[SURVIVES] if about.breaks is not None else chunk
             work = partial(conditions_at, about, poses, (*kinds, *measures))
-            arrays = run_grid(work, poses.size, chunk, results, workers, follow)
-            shaped = {name: array.reshape(poses.shape) for name, array in arrays.items()}
+            chunks = Chunks(poses.size, chunk, results, follow)
+            for job in finished_jobs(
+                work, chunks.missing, workers, stop=follow.stop, say=follow.say, name=POSES
+            ):
+                chunks.add(job)
+            shaped = {name: array.reshape(poses.shape) for name, array in chunks.arrays().items()}
             result = Workspace(
                 arguments=arguments, grid=poses, holds={name: shaped[name] for name in kinds},
                 values={name: shaped[name] for name in measures},

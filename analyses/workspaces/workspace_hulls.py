@@ -89,7 +89,7 @@ def robot_hull(
     def holds(positions: Array) -> np.ndarray:
         n = len(positions)
         each = [
-            np.all([KINDS[name].holds(about, at) for name in kinds], axis=0)
+            np.all([KINDS[name].value(about, at) for name in kinds], axis=0)
             for at in (Poses(0, n, positions, np.tile(turn, (n, 1, 1))) for turn in turns)
         ]
         return np.asarray((np.all if rule == "all" else np.any)(each, axis=0))

@@ -44,6 +44,14 @@ def refuse(capsys, *words):
     return said[0]
 
 
+def write_log(path, columns):
+    """A log with these columns; NaN becomes an empty cell."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join("" if value != value else f"{value:.12g}" for value in row) for row in rows]
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    return str(path)
+
+
 def killed_after(count, method, setup=""):
     """The program of a command whose process is killed after so many calls of a method.
 

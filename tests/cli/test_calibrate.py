@@ -21,32 +21,16 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.cli.commands import refuse, run, told
+from tests.analyses.calibration.logs import ROBOT, poses
+from tests.cli.commands import refuse, run, told, write_log
 
-COUNT = 20
-RANDOM = np.random.default_rng(0)
-ROBOT = load_robot("acrobot_small")
 TAGS = {
     k: pose_from_angles(np.array([x, y, 0.0]), np.zeros(3))
     for k, (x, y) in enumerate([(-0.15, -0.1), (-0.15, 0.1), (0.1, -0.1), (0.1, 0.1)])
 }
 TRUE = with_tags(calibration_model(ROBOT, "onboard"), TAGS)
-POSES = [
-    pose_from_angles(
-        np.append(RANDOM.uniform(-0.2, 0.2, 2), RANDOM.uniform(0.2, 0.6)),
-        RANDOM.uniform(-0.3, 0.3, 3),
-    )
-    for _ in range(COUNT)
-]
+POSES = poses(20)
 START = Point(TRUE, Stations.at(POSES[:1])).numbers[0, :, 0]
-
-
-def write(path, columns):
-    """A log with these columns; NaN becomes an empty cell."""
-    rows = zip(*columns.values(), strict=True)
-    lines = [",".join("" if not np.isfinite(v) else f"{v:.9g}" for v in row) for row in rows]
-    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
-    return str(path)
 
 
 def length_columns(readings):
@@ -75,7 +59,7 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(here, tracked, capsys):
     for cable, shift in zip(nominal.cables, shifts, strict=True):
         cable.exit_point = cable.exit_point + shift
     (here / "nominal.yaml").write_text(yaml_dump_typed(nominal))
-    write(here / "log.csv", tracked)
+    write_log(here / "log.csv", tracked)
     out = here / "out"
     words = ("calibrate", "nominal.yaml", "log.csv", *SIGMA, "--next=4", "--out", "out")
     found = told(capsys, *words, "--unknown", "exit_points")
@@ -94,7 +78,7 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(here, tracked, capsys):
 
 @pytest.mark.usefixtures("no_room_for_pictures")
 def test_figures_that_fail_cost_nothing_else(here, tracked, capsys):
-    write(here / "log.csv", tracked)
+    write_log(here / "log.csv", tracked)
     code, _, err = run(capsys, *ASKED, *SIGMA)
     assert code == 3
     assert "calibration.png: not written: [Errno 28]" in err
@@ -114,7 +98,7 @@ def test_the_camera_alone_calibrates(here, capsys):
         for c in range(4)
         for k, a in enumerate("uv")
     }
-    write(here / "log.csv", columns)
+    write_log(here / "log.csv", columns)
     found = told(
         capsys, *ASKED, "--unknown", "exit_points", "--prior", "exit_points=0.005",
         "--sigma", "lengths=1e-4", "--tag-size", "0.06", "--image-size", "640x480",
@@ -131,7 +115,7 @@ def test_swivels_of_the_other_sign_end_with_code_six(here, capsys):
     angles = -simulated_swivels(TRUE, POSES[:6], 2e-3, random)
     columns |= {f"C{i + 1}_swivel_rad": angles[:, i] for i in range(8)}
     columns |= {f"C{i + 1}_torque_nm": np.ones(6) for i in range(2)}
-    write(here / "log.csv", columns)
+    write_log(here / "log.csv", columns)
     found = told(
         capsys, *ASKED, "--no-rest", "--unknown", "C1.length_offset",
         "--sigma", "lengths=2e-4,swivels=3e-3", "--start", "0.15,0.1,0.2,15,5,5", code=6,
@@ -146,15 +130,9 @@ def test_swivels_of_the_other_sign_end_with_code_six(here, capsys):
 
 
 def test_what_a_log_cannot_tell_is_refused_and_nothing_written(here, tracked, capsys):
-    write(here / "log.csv", {name: values[:1] for name, values in tracked.items()})
-    for more, words in (
-        ("--unknown=C3.exit_point.z,C3.length_offset", "cannot be told from C3's"),
-        ("--unknown=exits", "accepted: exit_points"),
-        ("--sigma=length=1", "--sigma"),
-        ("--poses-from=x", "--poses-from: found without --campaign"),
-        ("--prior=exit_points=-1", "--prior"),
-    ):
-        assert words in refuse(capsys, *ASKED, more)
+    write_log(here / "log.csv", {name: values[:1] for name, values in tracked.items()})
+    said = refuse(capsys, *ASKED, "--unknown=C3.exit_point.z,C3.length_offset")
+    assert "cannot be told from C3's" in said
     assert [path.name for path in here.iterdir()] == ["log.csv"]
 
 
@@ -170,7 +148,7 @@ def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(here, capsys):
     readings = simulated_lengths(TRUE, [pose(t) for t in time], START, 1e-4, random)
     late = simulated_poses([pose(t - 0.2) for t in time], 1e-3, 5e-4, random)
     columns = {"time_s": time} | length_columns(readings) | pose_columns(late)
-    write(here / "log.csv", columns)
+    write_log(here / "log.csv", columns)
     asked = (*ASKED, *SIGMA, "--unknown", "exit_points")
     words = refuse(capsys, *asked)
     assert "s late" in words

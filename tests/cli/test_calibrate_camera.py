@@ -83,19 +83,12 @@ def test_pictures_give_what_the_command_writes_of_files(images, calibrated):
 
 def test_what_gives_no_camera_is_refused(images, tmp_path, capsys):
     cv2.imwrite(str(tmp_path / "other.png"), np.full((100, 100), 128, np.uint8))
-    (tmp_path / "text.png").write_text("no picture", encoding="utf-8")
     for files, more, words in (
         (images[:3], (), "images: found the board in 3; accepted: at least 5"),
         ([images[0], tmp_path / "other.png"], (), "other.png: found 100 x 100 pixels"),
-        ([tmp_path / "text.png"], (), "text.png: found no image"),
         ([tmp_path / "nothing.png"], (), "nothing.png: found no image"),
-        (images[:5], ("--squares", "9"), "--squares: found '9'"),
-        (images[:5], ("--size", "-1"), "--size: found -1"),
         (images[:5], ("--hold-out", "0.8"), "--hold-out: found 0.8"),
-        (images[:5], ("--rate", "0"), "--rate: found 0"),
     ):
-        out = tmp_path / "no"
-        options = dict(zip(BOARD[::2], BOARD[1::2], strict=True)) | dict([more] if more else [])
-        flat = [word for pair in options.items() for word in pair]
-        assert words in refuse(capsys, "calibrate-camera", *files, *flat, "--out", out)
-        assert not out.exists()
+        asked = ("calibrate-camera", *files, *BOARD, *more, "--out", tmp_path / "no")
+        assert words in refuse(capsys, *asked)
+        assert not (tmp_path / "no").exists()

@@ -39,21 +39,6 @@ def test_help_has_units_and_examples(capsys, monkeypatch, command):
         assert words in said
 
 
-def test_units_reach_the_terminal(capsys):
-    """Square brackets once were taken for markup."""
-    code, out, _ = run(capsys, "static", "acrobot_small", "--pose", "0,0,0.3")
-    assert code == 0
-    assert "length [m]" in out
-    assert "tension [N]" in out
-
-
-def test_an_infeasible_tension_is_an_answer(capsys):
-    found = told(capsys, "tension", "acrobot_small", "--pose", "0.5,0.5,1.1")
-    assert found["status"] == "infeasible"
-    words = " ".join(run(capsys, "tension", "--help")[1].split())
-    assert "Every answer has exit code 0" in words
-
-
 def test_view_writes_a_page(capsys, here):
     code, out, _ = run(capsys, "view", "planar", "--html", "robot.html")
     assert (code, out.strip()) == (0, "robot.html")

@@ -27,8 +27,8 @@ LONG_WORK = {
     "serve": ["cdpr_drake.cli.serve.Driver.wait"],
     "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
-    "workspace": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
-    "stability": ["cdpr_drake.analyses.workspaces.grid_runs.finished_jobs"],
+    "workspace": ["cdpr_drake.analyses.workspaces.workspace.finished_jobs"],
+    "stability": ["cdpr_drake.analyses.workspaces.stability.finished_jobs"],
     "plan": [
         "cdpr_drake.analyses.planning.path_plan.plan_along_path",
         "cdpr_drake.analyses.planning.free_plan.solve_free_motion",

@@ -7,7 +7,7 @@ import pytest
 
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model
 from cdpr_drake.models.robot_loader import load_robot
-from tests.cli.commands import refuse, run, told
+from tests.cli.commands import refuse, run, told, write_log
 from tests.identification.logs import TRUE, log
 
 NOISE = {"tension": 0.3, "place": 1e-4, "angle": 2e-4}
@@ -15,12 +15,9 @@ HEADER = ["time_s", *(f"X_WP.{n}" for n in ("qw", "qx", "qy", "qz", "x_m", "y_m"
 
 
 def write(path, time, poses, tensions):
-    """A log with columns as `cdpr simulate` names them; NaN becomes an empty cell."""
+    """A log with columns as `cdpr simulate` names them."""
     header = [*HEADER, *(f"measured_tensions.C{i + 1}_n" for i in range(tensions.shape[1]))]
-    rows = np.column_stack([time, poses, tensions])
-    lines = [",".join("" if not np.isfinite(v) else f"{v:.12g}" for v in row) for row in rows]
-    path.write_text("\n".join([",".join(header), *lines]) + "\n")
-    return str(path)
+    return write_log(path, dict(zip(header, [time, *poses.T, *tensions.T], strict=True)))
 
 
 @pytest.fixture(scope="module")
@@ -98,14 +95,12 @@ def test_logs_and_requests_that_cannot_tell_end_with_2(tmp_path, logs, capsys):
     ):
         path = write(tmp_path / "log.csv", *spoiled(kind))
         assert words in refuse(capsys, *identify(path, tmp_path / "out"))
-    for robot, options, words in (
-        ("acrobot_large", ["--unknown", "weight"], "--unknown: found 'weight'"),
-        ("acrobot_large", ["--bandwidth", "0"], "--bandwidth: found 0 Hz"),
-        ("acrobot_large", ["--unknown", "stiffness"], "cable lengths: found none"),
-        ("acrobot_large", ["--unknown", "friction"], "motor torques: found none"),
-        ("acrobot_large", ["--prior", "weight=1"], "--prior: found 'weight'"),
-        ("planar", [], "motion: found 2T1R"),
+    for options, words in (
+        (("--unknown", "weight"), "--unknown: found 'weight'"),
+        (("--bandwidth", "0"), "--bandwidth: found 0 Hz"),
+        (("--unknown", "stiffness"), "cable lengths: found none"),
+        (("--unknown", "friction"), "motor torques: found none"),
+        (("--prior", "weight=1"), "--prior: found 'weight'"),
     ):
-        out = tmp_path / "out"
-        assert words in refuse(capsys, "identify", robot, logs[0], *options, "--out", out)
+        assert words in refuse(capsys, *identify(logs[0], tmp_path / "out"), *options)
     assert not (tmp_path / "out").exists()

@@ -16,6 +16,7 @@ SERIES = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.
 
 FILES = {
     "file": "", "full/old": "", "mine/thesis.tex": "x", "mine.yaml": "years of work",
+    "list.json": "[1]", "number.json": "3",
     "bad.yaml": "name: x\nrobot: [1,\n",
     "zero.yaml": "box: [0, 0, 0, 0, 0, 0]\n", "inf.yaml": "box: [0, 0, 0, .inf, 0, 0]\n",
     "none.yaml": "vertices: []\n", "verts.yaml": "verts: []\n",
@@ -32,7 +33,6 @@ FILES = {
 FOLDERS = ("empty", "acrobot_pbvs", "old")
 
 QUICK = "--camera projected --duration 0.3"
-NOBODY = "tcp://127.0.0.1:9"
 
 REFUSED = {
     "": [
@@ -105,8 +105,7 @@ REFUSED = {
     ],
     "robots": [
         ("--motion 9R", "--motion: found '9R'; accepted: ", "3R3T"),
-        ("--cables many", "--cables: found 'many'; accepted: such as 8"),
-        ("--cables -", "--cables: found '-'"),
+        ("--cables -", "--cables: found '-'; accepted: such as 8"),
         ("--cables 99", "found no robot with all of these"),
         ("--gallery page.txt", "--gallery: found page.txt; accepted: ", ".html"),
         ("--gallery no/such/page.html", "found no folder"),
@@ -135,10 +134,8 @@ REFUSED = {
         ("acrobot_large --lengths .2,.2,.2,.2,.2,.2,.2,.2", "is stretched by 5"),
         ("planar --lengths .6,.6,.6,.6", "no pose in the frame has them"),
         ("planar --lengths .713,.713,.713,.713 --cable-model inextensible", "mm longer"),
-        ("cable_arm --joint elbow", "--joint: found 'elbow'"),
         ("cable_arm --joint knee=1", "found knee; accepted: one of cable_arm::elbow"),
         ("cable_arm --prestress 1,2", "--prestress: found [1. 2.]"),
-        ("cable_arm --lengths ''", "--lengths: found ''"),
         ("cable_arm --held knee", "joint: found knee"),
     ],
     "equilibria hung.yaml": [
@@ -165,7 +162,6 @@ REFUSED = {
         ("--obstacles no.yaml", "no.yaml", "no such file"),
         ("--kind static,collision-free --certify --obstacles spheres.yaml", "spheres[0].radius"),
         ("--acceleration -1", "--acceleration"),
-        ("--velocity 1,2", "--velocity", "1,2"),
         ("--measure payload", "payload", "planar"),
         ("--mesh a.stl", "--mesh", "--hull"),
         ("--certify --method closed_form", "--certify", "--method closed_form"),
@@ -194,7 +190,6 @@ REFUSED = {
         ("planar --scheme ibvs", "ibvs", "planar", "pbvs, pbvs-line"),
         ("nobody", "robot 'nobody' is unknown"),
         ("planar --grid 5,5", "--grid", "'5,5'", "lower:upper:step"),
-        ("planar --grid 5,5,a", "--grid", "lower:upper:step"),
         ("planar --grid 5,5,0:1:0.1", "z from 0 to 1"),
         ("planar --grid 5,5,4", "--grid", "found 4 points along z", "z = 0.3"),
         ("acrobot_small --grid 1e12,1e12,1e12", "--grid: found 1e+36 poses", "1e+07"),
@@ -203,20 +198,17 @@ REFUSED = {
         ("acrobot_small --grid 5:6:0.5,3,3",
          "grid", "x from 5 to 6", "(-0.6, -0.6, 0) to (0.6, 0.6, 1.2)"),
         ("README.md", "'README.md'", "has to end in .yaml"),
-        ("planar --vary r_A", "--vary", "name=value"),
-        ("planar --vary r_A=x", "--vary"),
-        ("planar --orientation 1,2", "--orientation", "phi,theta,psi"),
         ("planar --searches -1", "searches", "found -1", "at least 1"),
         ("planar --pieces 0", "pieces", "found 0", "at least 1"),
     ],
     "study": [
-        (f"worked-examples --quick --workers {NOBODY}", NOBODY),
         *((f"fusion --quick --out r {option} {value}", option, value) for option, value in (
             ("--seeds", "5:5"), ("--seeds", "1000000000000"), ("--workers", "0"))),
     ],
     "reproduce": [
         ("--only , --out r", "accepted"),
-        ("--out r --against old", "--against: old: found no facts.json"),
+        *((f"--out r --against {name}", f"--against: {name}: found no facts.json")
+          for name in ("old", "mine.yaml", "list.json", "number.json")),
     ],
     "import-log": [
         ("log.csv --out log.csv --overwrite", "found log.csv, the log itself"),
@@ -232,9 +224,19 @@ REFUSED = {
         ("long.csv --log-format csv", "long.csv"),
     ],
     "calibrate hangprinter_4 series.csv": [
-        ("--zero somewhere", "--zero: found 'somewhere'"),
         ("--bound tracker", "--bound"),
+        ("--unknown exits", "--unknown: found 'exits'; accepted: exit_points"),
+        ("--sigma length=1", "--sigma: found 'length=1'; accepted: name=number", "lengths_share"),
+        ("--prior exit_points=-1", "--prior: found 'exit_points=-1'"),
+        ("--poses-from x", "--poses-from: found without --campaign"),
     ],
+    "calibrate-camera mine.yaml --board charuco": [
+        ("--squares 9x7 --size 0.03", "mine.yaml: found no image"),
+        ("--squares 9 --size 0.03", "--squares: found '9'"),
+        ("--squares 9x7 --size -1", "--size: found -1"),
+        ("--squares 9x7 --size 0.03 --rate 0", "--rate: found 0"),
+    ],
+    "identify planar posed.csv": [("", "motion: found 2T1R")],
     "identify acrobot_large": [
         ("posed.csv", "tensions: found none"),
         ("pulled.csv", "poses: found none"),
@@ -290,18 +292,6 @@ def test_it_is_said_in_one_line_and_nothing_is_written(line, words, folder, monk
 )
 def test_of_long_words_the_middle_is_left_out(words, here, capsys):
     assert " ... " in refuse(capsys, *words)
-
-
-def test_words_do_not_steer_the_terminal(here, capsys):
-    said = refuse(capsys, "simulate", "\x1b[31mred\u202e\t.yaml")
-    assert "\\x1b[31mred\\u202e\\t.yaml: there is no such scenario file" in said
-    assert said.isprintable()
-
-
-def test_names_of_files_do_not_steer_the_terminal(here, capsys):
-    (here / "\x1b[31mred.yaml").write_text("name: [1,\n")
-    code, out, _ = run(capsys, "check", "\x1b[31mred.yaml")
-    assert (code, "\\x1b[31mred.yaml" in out, "\x1b" in out) == (2, True, False)
 
 
 @pytest.mark.parametrize("name", ["../../X", "/X", ".hidden", "a b", "x" * 65])
@@ -382,14 +372,15 @@ def raising(problem):
         RuntimeError("SpatialInertia: physically invalid:\n mass = nan\n and more"),
         RecursionError("maximum recursion depth exceeded"),
         CdprError("long " * 4000),
-        OSError(28, "No space left on device"),
+        OSError(28, "No space left on device", "log.npz"),
     ],
     ids=lambda problem: type(problem).__name__,
 )
 def test_what_drake_or_python_raise_is_one_line(problem, monkeypatch, capsys):
     monkeypatch.delenv(app.TRACEBACK, raising=False)
     monkeypatch.setattr("cdpr_drake.cli.call.run", raising(problem))
-    refuse(capsys, "robots")
+    said = refuse(capsys, "robots")
+    assert "log.npz: No space left on device" in said or not isinstance(problem, OSError)
 
 
 @pytest.mark.parametrize("mistake", [KeyError("name"), AssertionError(), RuntimeError("Drake")])

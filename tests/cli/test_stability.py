@@ -143,14 +143,14 @@ def test_a_killed_sweep_continues_and_says_so(capsys, here, monkeypatch):
 SLOW = """
 import sys, time
 from pathlib import Path
-from cdpr_drake.analyses.workspaces import grid_runs
+from cdpr_drake.analyses.workspaces import stability
 from cdpr_drake.cli.app import main
 
-def slow(work, span):
+def slow(held, servos, span):
     Path(f"began-{span[0]}").touch()
     time.sleep(1e6)
 
-grid_runs.chunk_arrays = slow
+stability.judged_poses = slow
 if __name__ == "__main__":
     main(sys.argv[1:])
 """

@@ -1,7 +1,6 @@
 """What a command imports before it answers, and how it refuses where it cannot start."""
 
 import ast
-import errno
 import os
 import subprocess
 import sys
@@ -9,7 +8,6 @@ import sys
 import pytest
 
 from cdpr_drake.cli.commands import COMMANDS
-from tests.cli.commands import run
 from tests.messages import messages
 
 WORDS = """
@@ -125,12 +123,3 @@ def test_a_locale_without_utf_8_is_said_in_one_line():
     assert done.returncode == 2
     assert len(messages(done.stderr).splitlines()) == 1
     assert "accepted: one with UTF-8" in done.stderr
-
-
-def test_what_the_system_refuses_is_one_line(capsys, monkeypatch):
-    def full(*arguments):
-        raise OSError(errno.ENOSPC, "No space left on device", "log.npz")
-
-    monkeypatch.setattr("cdpr_drake.analyses.catalogues.load_robot", full)
-    code, _, err = run(capsys, "robots")
-    assert (code, err) == (2, "cdpr: log.npz: No space left on device\n")

@@ -262,14 +262,6 @@ def test_a_report_of_a_study_again_and_beside_an_older_one(run, here):
     assert (code, "quick is true there, false here" in err) == (2, True)
 
 
-def test_a_report_beside_nonsense_is_refused_before_anything_is_run(run, here):
-    for text in ("nonsense", "[1]", "3"):
-        (here / "older.json").write_text(text)
-        code, _, err = run(*REPRODUCE, "--against", "older.json")
-        assert (code, "--against: older.json: found no facts.json" in err) == (2, True)
-        assert not (here / "r").exists()
-
-
 def test_without_a_browser_a_pdf_is_said_to_be_missing(run, monkeypatch):
     monkeypatch.setenv("PATH", os.devnull)
     code, _, err = run(*REPRODUCE, "--pdf")

@@ -26,7 +26,7 @@ def holds(robot, kinds, **request):
     """Where kinds hold over a robot's frame, by kind, shape (n,)."""
     grid = grid_by_count(*load_robot(robot).reach(), POINTS)
     about = grid_conditions(robot, kinds, (), grid, **request)
-    arrays = conditions_at(about, grid, kinds, 0, grid.size)
+    arrays = conditions_at(about, grid, kinds, (0, grid.size))
     return {kind: inside.astype(bool) for kind, inside in arrays.items()}
 
 

@@ -9,18 +9,15 @@ import pytest
 import yaml
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.design import search
 from cdpr_drake.analyses.design.candidates import make_candidates
 from cdpr_drake.analyses.design.confirmation import Confirmation, confirm
-from cdpr_drake.analyses.design.goals import GOALS, evaluate_goals
-from cdpr_drake.analyses.design.search import (
-    SLOPES,
-    evaluate_original,
-    goal_context,
-    search_design,
-)
+from cdpr_drake.analyses.design.goals import GOALS
+from cdpr_drake.analyses.design.search import SLOPES, evaluate_design, goal_context, search_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, load_design_settings
 from cdpr_drake.analyses.frame.follow import Follow
-from cdpr_drake.errors import CdprError, DesignError
+from cdpr_drake.analyses.frame.job import FinishedJob, ProcessDied
+from cdpr_drake.errors import CdprError, DesignError, SweepError
 from cdpr_drake.models.robot_loader import load_robot
 from tests.cli.commands import refuse, told
 
@@ -63,12 +60,14 @@ def test_cables_are_left_out_and_winches_change():
     sets = ["C1,C3,C5,C7", "C1,C2,C3,C4,C5,C6,C7,C8"]
     settings = small("power", "speed", winches=True, cables=sets)
     designs = make_candidates(ROBOT, settings)
-    robot = designs.robot(0, np.full(designs.size, 0.5))
+    middle = np.full(designs.size, 0.5)
+    robot = designs.robot(0, middle)
     assert [cable.name for cable in robot.cables] == ["C1", "C3", "C5", "C7"]
     assert robot.winch.motor_torque == pytest.approx(0.4)  # between, in ratios
     assert robot.winch.drum_radius == pytest.approx(0.04)
     assert robot.tension_bounds.upper == pytest.approx(0.4 * 10.0 / 0.04)
-    power, speed = evaluate_goals(robot, goal_context(ROBOT, settings), ("power", "speed"))
+    judging, names = goal_context(ROBOT, settings), ("power", "speed")
+    power, speed = evaluate_design(designs, judging, names, (0, middle))
     rate = 3000.0 * 2.0 * np.pi / 60.0
     assert power == pytest.approx(-4 * 0.4 * rate)  # less is better
     assert speed == pytest.approx(rate / 10.0 * 0.04)
@@ -77,7 +76,7 @@ def test_cables_are_left_out_and_winches_change():
 @pytest.mark.parametrize("name", [name for name in GOALS if name != "power"])
 def test_every_goal_is_a_number(name, candidates):
     judging = goal_context(ROBOT, small(name, counts=(2.0, 2.0, 2.0)))
-    (value,) = evaluate_original(candidates, judging, (name,))
+    (value,) = evaluate_design(candidates, judging, (name,))
     assert np.isfinite(value)
     if name == "accuracy":  # an exit point that is off by 1 mm moves the platform by millimetres
         assert 1e-4 < -value < 3e-2
@@ -112,12 +111,20 @@ def test_a_search_that_was_stopped_goes_on_as_if_it_had_not(tmp_path, settings, 
     assert again.earlier == 6
     assert np.array_equal(again.values, whole.values)
     assert np.array_equal(again.coordinates, whole.coordinates)
-    goals = evaluate_goals(load_robot(str(again.file)), again.judging, again.names)
+    best = make_candidates(str(again.file), settings)
+    goals = evaluate_design(best, again.judging, again.names)
     assert goals == pytest.approx(again.values[again.best])
     if settings.search == "evolution":
         more = kept(out, replace(settings, generations=4))
         assert len(more.values) == designs + 4
         assert more.earlier == designs
+
+
+def test_a_process_that_dies_ends_the_search_and_is_no_bad_design(monkeypatch):
+    died = FinishedJob(0, problem=ProcessDied("its process died"))
+    monkeypatch.setattr(search, "finished_jobs", lambda *_, **__: [died])
+    with pytest.raises(SweepError, match="its process died"):
+        searched(small("capacity-margin", search="slopes"))
 
 
 def test_slopes_find_a_better_design_than_evolution_with_more():

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
-from cdpr_drake.analyses.design.goals import evaluate_goals
 from cdpr_drake.analyses.design.program import DesignProgram
+from cdpr_drake.analyses.design.search import evaluate_design
 from cdpr_drake.analyses.design.settings import DesignSettings, GoalSettings, MirrorSettings
 from cdpr_drake.errors import DesignError
 from cdpr_drake.models.robot_loader import load_robot
@@ -50,8 +50,10 @@ def margins():
     program, goals = heights(), ("capacity-margin",)
     shares = np.linspace(0.0, 1.0, GRID)
     z = [program.values().at(np.array([share]))[0] for share in shares]
-    robots = [program.candidates.robot(0, np.array([share])) for share in shares]
-    values = [evaluate_goals(robot, program.judging, goals)[0] for robot in robots]
+    values = [
+        evaluate_design(program.candidates, program.judging, goals, (0, np.array([share])))[0]
+        for share in shares
+    ]
     return np.array(z), np.array(values)
 
 

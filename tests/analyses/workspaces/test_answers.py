@@ -1,8 +1,13 @@
 """Workspaces by a linear programme, by proofs, over pulleys, without a frame, and by method."""
 
 import pickle
+import signal
+import subprocess
+import sys
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -10,7 +15,6 @@ import yaml
 from scipy.optimize import linprog
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.workspaces import box_certificates
 from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import conditions_at
@@ -25,6 +29,8 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OUTSIDE
 from cdpr_drake.workspaces.box_grid_agreement import hull_agreement
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
+from tests.cli.commands import STORE_ARRAYS, ended, killed_after
+from tests.cli.conftest import only
 from tests.models.formats import foreign_files
 from tests.motion.small_robots import content
 
@@ -187,32 +193,48 @@ def test_a_camera_s_target_gets_to_other_processes():
     about = grid_conditions("acrobot_small", kinds, (), grid, "acrobot_pbvs")
     work = partial(conditions_at, about, grid, kinds)
     here, there = (
-        each(0, grid.size)[kinds[0]] for each in (work, pickle.loads(pickle.dumps(work)))
+        each((0, grid.size))[kinds[0]] for each in (work, pickle.loads(pickle.dumps(work)))
     )
     np.testing.assert_array_equal(here, there)
     assert 0 < np.count_nonzero(here) < grid.size
 
 
-class Killed(BaseException):
-    """What no handler takes, as the end of a process."""
+BOXES = (
+    "workspace", "planar", "--grid", "2,2,1", "--certify", "--boxes", "1500", "--refine",
+    "0.5,0.5,0.3;0,0.5,0.3", "--refine-boxes", "300", "--workers", "1",
+)  # fmt: skip
+"""A command whose grid is written twice, then a journal each time that boxes were judged."""
+
+AT_ONCE = """
+from cdpr_drake.analyses.workspaces import box_certificates
+box_certificates.SAVE_SECONDS = 0.0
+"""
 
 
-def test_a_search_for_boxes_goes_on_after_its_end_half_way(tmp_path, monkeypatch):
-    """It loses seconds at most, and ends as one that was not ended."""
-    robot = load_robot("planar")
-    search = box_search(robot, pose_conditions(robot), ["static"], np.zeros((1, 3)))
-    monkeypatch.setattr(box_certificates, "SAVE_SECONDS", 0.0)
-
-    def die(judged, share):
-        if judged > 750:
-            raise Killed
-
-    with pytest.raises(Killed), Folder(tmp_path, {"boxes": True}) as folder:
-        certified_boxes(search, 1500, folder, on_progress=die)
-    monkeypatch.undo()
-    with np.load(tmp_path / "boxes_journal.npz") as stored:
-        assert 0 < len(stored["verdicts"]) < 1500
-    with Folder(tmp_path, {"boxes": True}) as folder:
-        whole, continued = certified_boxes(search, 1500), certified_boxes(search, 1500, folder)
-    for name in ("poses", "halves", "verdicts", "curve"):
-        np.testing.assert_array_equal(getattr(whole, name), getattr(continued, name))
+@pytest.mark.parametrize(
+    ("writes", "name", "function"), [(11, "boxes", "certify"), (20, "refined", "refine")]
+)
+def test_a_killed_search_for_boxes_goes_on_to_the_same_bytes(
+    tmp_path, monkeypatch, writes, name, function
+):
+    """By SIGKILL, when the grid and some boxes are kept."""
+    monkeypatch.chdir(tmp_path)
+    Path("killed.py").write_text(killed_after(writes, STORE_ARRAYS, AT_ONCE))
+    words = [sys.executable, "killed.py", *BOXES, "--out", "killed"]
+    assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
+    with np.load(f"killed/{name}_journal.npz") as journal:
+        judged = len(journal["verdicts"])
+    assert not Path("killed/boxes.npz").exists()
+    spy = Mock(wraps=getattr(box_certificates, function))
+    monkeypatch.setattr(box_certificates, function, spy)
+    with only():
+        assert [ended(*BOXES, "--out", folder) for folder in ("killed", "whole")] == [0, 0]
+    known = [call.kwargs["known"] for call in spy.call_args_list]
+    assert len(known[0].arrays()[0]) == judged
+    assert known[1] is None
+    killed, whole = (
+        {path.name: path.read_bytes() for path in Path(folder).glob("[!.]*")}
+        for folder in ("killed", "whole")
+    )
+    assert {"boxes.npz", "results.json", f"{name}_journal.npz"} <= {*whole}
+    assert killed == whole

@@ -155,8 +155,9 @@ def test_the_target_may_be_a_real_one():
     X_PC = robot.camera_mount("onboard").pose.transform()
     target = FixedObject(RigidTransform(), RigidTransform([0.0, 0.0, 0.3]))
     grid = grid_by_count(*GRID, TURNS)
-    servo = robot_stability(robot, grid, ServoView(target, X_PC, "object"), verdict="sampled")
-    assert np.mean(servo(0, grid.size)["stable"]) > 0.1
+    servo = robot_stability(robot, grid, ServoView(target, X_PC, "object"))
+    judged = judge_stability(servo.case, servo.bounds, grid.pose_rows(0, grid.size), "sampled")
+    assert np.mean(judged.stable) > 0.1
     scenario = load_scenario("acrobot_pbvs", ["robot=acrobot_large", "camera.kind=projected"])
     by_object, by_name = (scenario_view(robot, each) for each in (scenario, "acrobot_pbvs"))
     assert by_object.X_PC.IsExactlyEqualTo(by_name.X_PC)

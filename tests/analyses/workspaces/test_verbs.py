@@ -33,7 +33,7 @@ def test_workspaces(planar):
     )
     about = pose_conditions(planar, required=SpatialSet(box=np.repeat([0.0, 2.0], 3)))
     names = ("wrench-feasible", "capacity-margin")
-    expected = conditions_at(about, found.grid, names, 0, found.grid.size)
+    expected = conditions_at(about, found.grid, names, (0, found.grid.size))
     np.testing.assert_array_equal(found.inside().ravel(), expected["wrench-feasible"])
     np.testing.assert_array_equal(found.values[names[1]].ravel(), expected[names[1]])
     assert np.any(found.inside())
