@@ -21,7 +21,7 @@ import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CheckpointError, OutputFolderError
+from cdpr_drake.errors import CheckpointError, OutputFolderError, StoppedError
 from cdpr_drake.schema.json_text import load_json
 
 Log = Mapping[str, Array]
@@ -183,11 +183,16 @@ class Recorder:
             self.save()
 
     def finish(self) -> Log:
-        """The whole log."""
+        """The whole log.
+
+        Raises:
+            StoppedError: It has no row.
+        """
         if self._folder is None:
             return self._source.take_rows()
         self._move()
-        assert self._log is not None
+        if self._log is None:
+            raise StoppedError("stopped; nothing was simulated")
         return self._log
 
     def save(self) -> None:

@@ -6,6 +6,7 @@ A kind is one class: how it is built and steps (`engine`), its numbers, its sect
 from __future__ import annotations
 
 import hashlib
+import shlex
 import shutil
 import time
 from abc import abstractmethod
@@ -23,6 +24,7 @@ from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.provenance import (
     code_version,
     package_versions,
@@ -390,7 +392,7 @@ class Run(Result):
             ("simulated", f"{self.sim_time:.2f} s, {factor:.1f} x real time"),
             ("cables", summary["geometry"]), *self.facts(summary),
             *(("remark", remark) for remark in summary.get("remarks", ())),
-            ("results", str(self.folder or "none")),
+            ("results", "none" if self.folder is None else str(shown_path(self.folder))),
         ]  # fmt: skip
         if summary["message"]:
             rows.append(("message", summary["message"]))
@@ -402,12 +404,14 @@ class Run(Result):
         if self.stopped:
             again = "the same command goes on"
             if self.outcome == Outcome.INTERRUPTED and not self._has_checkpoint():
-                again = f"cdpr finish {self.folder} writes figures of it"
+                again = "what was simulated is kept"
+                if self.folder is not None:
+                    again = f"cdpr finish {shlex.quote(str(shown_path(self.folder)))} draws it"
             lines.append(f"Interrupted at {time}; {again}")
         elif self.outcome == Outcome.CLIENT_ENDED:
             lines.append(f"cdpr: the run ended at {time}: {self.message}")
-        if self.failed:
-            lines.append(f"The data is complete in {self.folder}")
+        if self.failed and self.folder is not None:
+            lines.append(f"The data is complete in {shown_path(self.folder)}")
         return lines
 
     def _has_checkpoint(self) -> bool:
