@@ -7,6 +7,7 @@ Callers in Python pass values.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
@@ -22,6 +23,9 @@ FORMATS = ("png", "pdf", "svg")
 
 MOST_PROCESSES = 4096
 """Of one machine; a larger number is a mistake."""
+
+LARGEST_SEED, MOST_SEEDS = 2**31 - 1, 100_000
+"""Of a command line."""
 
 
 def words(
@@ -119,6 +123,20 @@ def workers(word: str) -> int | str:
     return count
 
 
+def seeds(word: str) -> list[int]:
+    """Seeds of 0:20, where 20 is not included, or of 3,5,8, each once."""
+    span = re.fullmatch(r"(\d{1,10}):(\d{1,10})", word)
+    if span and int(span[2]) - int(span[1]) <= MOST_SEEDS:
+        result = list(range(int(span[1]), int(span[2])))
+    elif re.fullmatch(r"\d{1,10}(,\d{1,10})*", word):
+        result = [int(part) for part in word.split(",")]
+    else:
+        result = []
+    if not result or len(set(result)) < len(result) or max(result) > LARGEST_SEED:
+        raise ValueError(word)
+    return result
+
+
 def named_numbers(word: str) -> tuple[str, Array]:
     """A name and numbers, of name=value or name=v1,v2."""
     name, mark, values = word.partition("=")
@@ -199,6 +217,11 @@ Workers: TypeAlias = Annotated[
     int | str | None,
     words(workers, f"1 to {MOST_PROCESSES} processes, or a Dask scheduler, tcp://host:port or its "
           "file", "COUNT|SCHEDULER"),
+]  # fmt: skip
+Seeds: TypeAlias = Annotated[
+    Sequence[int],
+    words(seeds, "first:end, as 0:20 for 0 to 19, or different seeds separated by commas, up to "
+          f"{LARGEST_SEED} and {MOST_SEEDS} of them", "FIRST:END|SEED,..."),
 ]  # fmt: skip
 Overrides: TypeAlias = Annotated[
     Sequence[str], words(str, "key=value", "KEY=VALUE", name="--set", many=True)

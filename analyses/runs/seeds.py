@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeAlias
+from typing import Annotated, Any, Self
 
 import numpy as np
 from cyclopts import Parameter
@@ -37,9 +36,9 @@ from cdpr_drake.analyses.frame.words import (
     OutFolder,
     Overrides,
     ScenarioWord,
+    Seeds,
     Switch,
     Workers,
-    words,
 )
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
@@ -85,32 +84,8 @@ REACHED = {
 SEEDS = "seeds"
 """Folder of the records in a results folder, a file a seed."""
 
-MOST_NAMED = 3
-"""Runs that failed are named up to this number."""
-
-LARGEST_SEED, MOST_RUNS = 2**31 - 1, 100_000
-"""Of a command line."""
-
-
-def seeds_of(word: str) -> list[int]:
-    """Seeds of 0:20, where 20 is not included, or of 3,5,8; raises ValueError."""
-    span = re.fullmatch(r"(\d{1,10}):(\d{1,10})", word)
-    if span and int(span[2]) - int(span[1]) <= MOST_RUNS:
-        seeds = list(range(int(span[1]), int(span[2])))
-    elif re.fullmatch(r"\d{1,10}(,\d{1,10})*", word):
-        seeds = [int(part) for part in word.split(",")]
-    else:
-        seeds = []
-    if not seeds or len(set(seeds)) < len(seeds) or max(seeds) > LARGEST_SEED:
-        raise ValueError(word)
-    return seeds
-
-
-Seeds: TypeAlias = Annotated[
-    Sequence[int],
-    words(seeds_of, "first:end, as 0:20 for 0 to 19, or different seeds separated by commas, up to "
-          f"{LARGEST_SEED} and {MOST_RUNS} of them", "FIRST:END|SEED,..."),
-]  # fmt: skip
+MOST_NAMED = 10
+"""Seeds of runs that failed are named at the end, up to this number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,10 +245,11 @@ class Repetition(Result):
 
     def notes(self) -> list[str]:
         """Runs that failed or were not begun."""
-        failed = list(self.lost.values())
-        lines = [f"cdpr: {words}" for words in failed[:MOST_NAMED]]
-        if len(failed) > MOST_NAMED:
-            lines.append(f"cdpr: {len(failed) - MOST_NAMED} more runs failed")
+        lines = []
+        if self.lost:
+            seeds = [str(self.scenarios[index].seed) for index in sorted(self.lost)]
+            shown = ", ".join([*seeds[:MOST_NAMED], *(["..."] if seeds[MOST_NAMED:] else [])])
+            lines.append(f"cdpr: {len(seeds)} of {len(self.scenarios)} runs failed: seed {shown}")
         if self.interrupted:
             kept = "" if self.folder is None else f" are in {self.folder}"
             count = f"{len(self.records)} of {len(self.scenarios)} runs{kept}"

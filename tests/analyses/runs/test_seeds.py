@@ -17,6 +17,7 @@ from scipy.io import loadmat
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.frame.words import seeds
 from cdpr_drake.analyses.runs import seeds as module
 from cdpr_drake.analyses.runs.seeds import (
     METRICS,
@@ -25,7 +26,6 @@ from cdpr_drake.analyses.runs.seeds import (
     entries,
     repeat_run,
     run_many,
-    seeds_of,
     statistics,
     with_seeds,
 )
@@ -119,7 +119,8 @@ def test_a_run_that_raises_is_named_and_the_others_go_on(scenario, monkeypatch):
     lines = []
     runs = run_many(with_seeds(scenario, range(4)), 1, follow=Follow(say=lines.append))
     assert lines == [f"seed {k}: ValueError: no such luck" for k in (1, 2)]
-    assert runs.notes() == [f"cdpr: {line}" for line in lines]
+    assert runs.notes() == ["cdpr: 2 of 4 runs failed: seed 1, 2"]
+    assert list(runs.lost.values()) == lines
     assert [record.seed for record in runs.records] == [0, 3]
     assert (runs.exit_code, runs.as_dict()["lost_seeds"]) == (3, [1, 2])
 
@@ -312,7 +313,7 @@ def test_it_shows_millimetres_and_degrees(hand):
         "repeatability [mm]": "1.000", "repeatability [deg]": f"{np.degrees(0.1):.3f}",
         "repeatability, ISO 9283 [mm]": "1.000",
     }  # fmt: skip
-    assert hand.notes()[0] == "cdpr: seed 7: its process died (SIGKILL; out of memory?)"
+    assert hand.notes()[0] == "cdpr: 1 of 5 runs failed: seed 7"
     nothing = replace(hand, records=())
     assert nothing.tables()[0].title == "acrobot_pbvs: no run finished"
     assert nothing.figures() == {}
@@ -353,7 +354,7 @@ MANY = ("simulate", "--camera", "projected", "--workers", "1", "--seeds")
 
 def test_seeds_are_spans_and_lists(capsys):
     words = {"0:3": [0, 1, 2], "5:6": [5], "4": [4], "3,5,8": [3, 5, 8]}
-    assert {each: seeds_of(each) for each in words} == words
+    assert {each: seeds(each) for each in words} == words
     for each in (
         "", "3:3", "5:2", "1:2:3", "-1:2", "1,1", "a", "1.5", "0:9999999999", "9999999999",
     ):  # fmt: skip
@@ -361,8 +362,8 @@ def test_seeds_are_spans_and_lists(capsys):
 
 
 def test_runs_over_seeds_are_a_folder_and_finished_ones_are_found_again(capsys, here):
-    def repeat(seeds, duration="0.1", *more):
-        code, out, err = run(capsys, *MANY, seeds, "--json", "--duration", duration, *more)
+    def repeat(span, duration="0.1", *more):
+        code, out, err = run(capsys, *MANY, span, "--json", "--duration", duration, *more)
         return code, json.loads(out) if out else None, err
 
     code, summary, said = repeat("0:2")
