@@ -411,7 +411,10 @@ class Run(Result):
         elif self.outcome == Outcome.CLIENT_ENDED:
             lines.append(f"cdpr: the run ended at {time}: {self.message}")
         if self.failed and self.folder is not None:
-            lines.append(f"The data is complete in {shown_path(self.folder)}")
+            lines.append(
+                f"The data is complete in {shown_path(self.folder)}; "
+                "the same command draws what is missing"
+            )
         return lines
 
     def _has_checkpoint(self) -> bool:

@@ -73,8 +73,8 @@ def simulate(
 ) -> Run:  # fmt: skip
     """Simulates a scenario and writes summary, log, figures and replay.
 
-    The same command goes on with a run that was killed or interrupted, in its folder, and gives the
-    same numbers as an uninterrupted run.
+    The same command goes on with a run that was killed or interrupted, in its folder, gives the
+    same numbers as an uninterrupted run, and draws what is missing.
 
     Args:
         scenario: Scenario by name, path of a YAML file, or folder of a run, to repeat it.
@@ -137,7 +137,7 @@ def simulate(
         if run.outcome != Outcome.INTERRUPTED:
             run.draw(results, formats, _exports(run, results, exports, video), follow)
             run.stopped = follow.stop()
-        if not run.stopped:
+        if not run.stopped and not run.failed:
             run.settle(results)
     return run
 

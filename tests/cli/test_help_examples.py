@@ -23,8 +23,13 @@ EXAMPLES = sorted({line for command in COMMANDS.values() for line in command.exa
 EXAMPLES += sorted({*FIRST_STEPS} - set(EXAMPLES))
 
 LONG_WORK = {
-    "simulate": ["cdpr_drake.cli.sessions.FollowedSession.computing"],
-    "serve": ["cdpr_drake.cli.serve.Driver.wait"],
+    "simulate": [
+        "cdpr_drake.analyses.runs.run.Run.simulate",
+        "cdpr_drake.analyses.runs.seeds.finished_jobs",
+    ],
+    "finish": ["cdpr_drake.analyses.runs.simulate.read_marker"],
+    "serve": ["cdpr_drake.analyses.runs.serve.Driver.wait"],
+    "reactions": ["cdpr_drake.analyses.runs.run.Run.simulate"],
     "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
     "workspace": ["cdpr_drake.analyses.workspaces.workspace.finished_jobs"],

@@ -36,7 +36,7 @@ QUICK = "--camera projected --duration 0.3"
 
 REFUSED = {
     "": [
-        ("fly", "command: found 'fly'; accepted: simulate, serve"),
+        ("fly", "command: found 'fly'; accepted: simulate, finish"),
         ("view planar --html no/such/page.html", "no folder"),
         *((f"view acrobot_small --html {name}",
            f"--html: found {name}; accepted: a file that ends in .html")

@@ -28,7 +28,7 @@ SAME_TENSIONS_PATH = 1e-12
 def by_both(run, name, *overrides):
     """A run by the plant, one by the compiled engine, and how far apart their paths are [m]."""
     one, other = (
-        run(load_scenario(name, [*overrides, engine]))
+        run(load_scenario(name, [*overrides, engine])).simulate()
         for engine in ("integration.engine=plant", COMPILED)
     )
     count = min(len(one.log["time"]), len(other.log["time"]))

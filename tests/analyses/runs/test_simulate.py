@@ -147,9 +147,10 @@ def test_a_figure_that_fails_costs_no_other(capsys, here, monkeypatch):
     def broken(run):
         raise RuntimeError("no font")
 
-    monkeypatch.setattr(f"{error_figure.__module__}.error_figure", broken)
     words = (*SHORT, "--out", "out", "--json", "--figure-format", "pdf,svg")
-    with only("error.pdf", "error.svg", "tensions.pdf", "tensions.svg", ".png", "replay.html"):
+    drawn = only("error.pdf", "error.svg", "tensions.pdf", "tensions.svg", ".png", "replay.html")
+    with drawn, monkeypatch.context() as patch:
+        patch.setattr(f"{error_figure.__module__}.error_figure", broken)
         code, out, err = run(capsys, *words)
     assert code == 3
     assert "error.pdf: not written: no font" in err
@@ -158,6 +159,9 @@ def test_a_figure_that_fails_costs_no_other(capsys, here, monkeypatch):
     drawn = {name for name in names if name.endswith((".png", ".pdf", ".svg", ".html"))}
     assert drawn == {"tensions.pdf", "tensions.svg", "replay.html"}
     assert {"summary.json", "log.npz"} <= names
+    with only("error.svg", "replay.html"):
+        assert ended(*words) == 0  # the same command draws what is missing
+    assert (here / "out" / "error.svg").is_file()
 
 
 def test_a_broken_graphics_driver_is_one_line(capsys, here, monkeypatch):
