@@ -167,15 +167,21 @@ class PointTarget(Target):
     def solve(self, marks: Array, pinhole: Pinhole) -> RigidTransform | None:
         """As the base class says."""
         points, image = self._rows, np.ascontiguousarray(marks).reshape(-1, 2)
-        if not math.isfinite(marks @ marks):
-            seen = np.all(np.isfinite(image), axis=1)
-            points, image = points[seen], image[seen]
-        return _pose_from_rows(points, image, pinhole)
+        if math.isfinite(sum(marks.tolist())):
+            return _pose_from_rows(points, image, pinhole, self._in_space)
+        seen = np.all(np.isfinite(image), axis=1)
+        points = points[seen]
+        return _pose_from_rows(points, image[seen], pinhole, bool(np.any(points[:, 2])))
 
     @cached_property
     def _rows(self) -> Array:
         """The points as rows, shape (n, 3) [m]."""
         return np.ascontiguousarray(self.points.T)
+
+    @cached_property
+    def _in_space(self) -> bool:
+        """Whether a point is off the plane z = 0."""
+        return bool(np.any(self.points[2]))
 
     def normalized(self, marks: Array, pinhole: Pinhole) -> Array:
         """As the base class says."""
@@ -217,14 +223,17 @@ def pose_from_points(p_OK: Array, uv: Array, pinhole: Pinhole) -> RigidTransform
         uv: Their images, shape (2, n) [px].
         pinhole: The camera.
     """
-    return _pose_from_rows(np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T), pinhole)
+    points, image = np.ascontiguousarray(p_OK.T), np.ascontiguousarray(uv.T)
+    return _pose_from_rows(points, image, pinhole, bool(np.any(p_OK[2])))
 
 
-def _pose_from_rows(points: Array, image: Array, pinhole: Pinhole) -> RigidTransform | None:
+def _pose_from_rows(
+    points: Array, image: Array, pinhole: Pinhole, in_space: bool
+) -> RigidTransform | None:
     """As `pose_from_points`, of points and images in rows, shape (n, 3) [m] and (n, 2) [px]."""
     if len(points) < 4:
         return None
-    if np.count_nonzero(points[:, 2]):
+    if in_space:
         return _pose_in_space(points, image, pinhole)
     R, p = np.empty((3, 3)), np.empty(3)
     if not planar_pose(points, image, pinhole.numbers, R, p):

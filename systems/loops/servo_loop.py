@@ -243,17 +243,18 @@ class ServoLoop:
             CableGeometryError: A cable cannot run.
             DivergedError: Numbers are not finite any more.
         """
+        clocks, logging = self._clocks, self._logging
         while self.time < boundary:
-            if self._struck and self._struck != [self._logging]:
+            if self._struck and self._struck != [logging]:
                 self._update()
-            self.time = now = first_time(self._clocks, boundary)
+            self.time = now = first_time(clocks, boundary)
             self._motion.advance(now)
             for estimate in self._estimates:
                 estimate.forget()
-            self._struck = [c for c in self._clocks if c.next == now and c.strikes(now)]
-            if self._logging in self._struck:
-                self.log.append(self.time)
-            if self._judged != Outcome.RUNNING and self._control in self._struck:
+            self._struck = struck = [c for c in clocks if c.next == now and c.strikes(now)]
+            if logging in struck:
+                self.log.append(now)
+            if self._judged and self._control in struck:
                 self.outcome = self._judged
                 return
 
