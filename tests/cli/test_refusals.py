@@ -128,6 +128,7 @@ REFUSED = {
         ("cable_arm --pose 0,0,0", "--pose: found with a mechanism"),
         ("cable_arm --lengths 1,1,1,1 --prestress 5", "--prestress: found with --lengths"),
         ("cable_arm --joint=[] --joint=elbow=1", "--joint: found '[]'; accepted: name=value"),
+        ("cable_arm --joint==1", "--joint: found '=1'; accepted: name=value"),
         ("planar --held none --yields pose", "--yields, --held: found with a robot with one"),
         ("acrobot_large --lengths 1,1,1,1,1,1,1,-1", "--lengths: found -1; accepted: > 0"),
         ("acrobot_large --pose 0.5,0,0.5", "no tensions within 0..60 N"),
