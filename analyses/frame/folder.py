@@ -121,9 +121,10 @@ class Folder:
             goes_on = self._grows or not marker["complete"]
             self.resumed = goes_on and not different and not self._overwrite
             if not self.resumed and not self._overwrite:
-                words = "; ".join(different[:3]) or "these are complete"
+                words = "; ".join(different[:3])
+                there = f"other results: {words}" if words else "complete results of this command"
                 raise OutputFolderError(
-                    f"{self.path}: holds other results: {words}; {self._elsewhere} or add overwrite"
+                    f"{self.path}: holds {there}; {self._elsewhere} or add overwrite"
                 )
             self._files = marker["files"]
         for path in list(self.path.iterdir()):

@@ -384,9 +384,8 @@ class Run(Result):
     def tables(self) -> list[Table]:
         """What it came to."""
         summary = self.as_dict()
-        end = summary["outcome"]
-        if self.chosen_end and self.outcome == Outcome.TIMEOUT:
-            end = f"ended at {self.sim_time:g} s, as asked"
+        as_asked = self.chosen_end and self.outcome == Outcome.TIMEOUT
+        end = f"ended at {self.sim_time:g} s, as asked" if as_asked else summary["outcome"]
         factor = summary["realtime_factor"] or 0.0
         rows = [
             ("simulated", f"{self.sim_time:.2f} s, {factor:.1f} x real time"),
@@ -394,7 +393,7 @@ class Run(Result):
             *(("remark", remark) for remark in summary.get("remarks", ())),
             ("results", "none" if self.folder is None else str(shown_path(self.folder))),
         ]  # fmt: skip
-        if summary["message"]:
+        if summary["message"] and not as_asked:
             rows.append(("message", summary["message"]))
         return [Table(f"{self.scenario.name}: {end}", rows=rows)]
 

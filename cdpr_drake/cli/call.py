@@ -251,11 +251,13 @@ def _show(result: Any, call: Call) -> int:
 
 
 def options_of(verb: Callable[..., Any]) -> dict[str, str]:
-    """Options of a verb by the names of its arguments."""
+    """Options of a verb by the names of its arguments, without its subject and other words."""
     found = {}
-    for argument, parameter in inspect.signature(verb, eval_str=True).parameters.items():
+    parameters = inspect.signature(verb, eval_str=True).parameters
+    for place, (argument, parameter) in enumerate(parameters.items()):
+        optional = parameter.default is not parameter.empty and place > 0
         if parameter.kind is parameter.POSITIONAL_ONLY or (
-            parameter.kind is not parameter.KEYWORD_ONLY and parameter.default is parameter.empty
+            parameter.kind is not parameter.KEYWORD_ONLY and not optional
         ):
             continue
         names = _own_names(parameter)

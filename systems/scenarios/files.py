@@ -17,7 +17,7 @@ from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
-from cdpr_drake.models.robot_loader import load_robot, robot_file
+from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_text, input_there
 from cdpr_drake.schema.typed_yaml import closest, load_typed
@@ -92,7 +92,13 @@ def scenario_file(name: str) -> Path:
     if name not in scenario_names():
         if Path(name).is_dir():
             return _in_folder(Path(name))
-        raise ScenarioError(f"scenario {name!r} is unknown; {closest(name, scenario_names())}")
+        known = closest(name, scenario_names())
+        if name in robot_names():
+            known = (
+                "it is a robot, which cdpr tension, workspace and view take; cdpr new scenario "
+                f"mine --robot {name} writes a scenario of it"
+            )
+        raise ScenarioError(f"scenario {name!r} is unknown; {known}")
     return _FOLDER / f"{name}.yaml"
 
 

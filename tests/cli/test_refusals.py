@@ -49,6 +49,8 @@ REFUSED = {
         ("import long.csv", "long.csv"),
     ],
     "simulate": [
+        ("nobody", "cdpr: scenario 'nobody' is unknown"),
+        ("acrobot_large", "cdpr: scenario 'acrobot_large' is unknown; it is a robot, which cdpr"),
         ("nothing.yaml", "nothing.yaml", "no such scenario file"),
         ("hung.yaml", "found a robot; use a command that takes one, such as cdpr tension"),
         ("bad.yaml", "bad.yaml:3: does not parse as YAML"),

@@ -96,7 +96,7 @@ REFUSALS = {
     "an edited file": (_edit, "changed since: log.csv"),
     "another file": (_another, "did not write, or that changed since: notes.txt"),
     "a folder of somebody": (_no_marker, "thesis.tex"),
-    "complete results": (written, "these are complete"),
+    "complete results": (written, "holds complete results of this command"),
     "a file": (lambda path: path.write_text("mine"), "found a file; accepted: a folder"),
     "a damaged marker": (
         lambda path: (written(path) / MARKER).write_text("{"),

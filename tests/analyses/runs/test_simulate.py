@@ -291,7 +291,7 @@ def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_fig
     assert "scenario.seed is 0 there, 5 here; name another folder or add --overwrite" in asked
     assert ended(*words, "--out", "out") == 0
     same_files(here / "whole", here / "out")
-    assert "these are complete" in refuse(capsys, *words, "--out", "out")
+    assert "holds complete results of this command" in refuse(capsys, *words, "--out", "out")
 
     class EndedError(BaseException):
         """The process ends while figures are drawn."""
