@@ -5,8 +5,8 @@ together. It is judged as the robot file that it would be: points moved, cables 
 motor changed.
 
 * `MovedPoints` makes displacements of points of the vector.
-* `goals.GOALS` is the table of what may be wanted; volumes are shares of a grid of poses and steer the
-  search only.
+* `goals.GOALS` is the table of what may be wanted; volumes are shares of a grid of poses and steer
+  the search only.
 * `evolve` seeks the vector of the largest score by CMA-ES, which needs no gradients: shares of
   poses are steps of the coordinates.
 * `climb` seeks the largest least of smooth functions by their slopes, which takes far fewer designs
