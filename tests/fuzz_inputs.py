@@ -94,7 +94,7 @@ PICTURES = ((simulation, "write_pictures"), (Stability, "figures"))
 LONG_WORK = {
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],
     "plan": ["cdpr_drake.analyses.planning.path_plan.plan_along_path"],
-    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.reconfigured"],
+    "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.results_folder"],
 }
 """Where the long work of a command begins: all that it reads is read and accepted there."""
 
@@ -132,7 +132,9 @@ def child(case: Case, work: Path, base: Path, longest: float) -> None:
             module._FOLDER = work / case.catalogue
         for target in LONG_WORK.get("".join(case.arguments[:1]), ()):
             place, _, name = target.rpartition(".")
-            setattr(pkgutil.resolve_name(place), name, _done)
+            module = pkgutil.resolve_name(place)
+            assert hasattr(module, name), target
+            setattr(module, name, _done)
         app.main(case.arguments)
         code = 0
     except SystemExit as end:
