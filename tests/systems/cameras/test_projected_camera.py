@@ -175,6 +175,11 @@ def test_noise_depends_on_seed_and_image_only():
     assert not np.any(image(1, 7) == image(2, 7))
     assert not np.any(image(1, 7) == image(1, 8))
     assert not np.any(image(0, 1) == image(1, 0))
+    again = camera(pixel_noise=0.3, seed=1)  # one that takes images anew, and in any order
+    context = looking_from(again, X_WB_at(0.0))
+    for number in (7, 8, 7, 40, 8, 8, 3):
+        context.SetTime(number / RATE)
+        np.testing.assert_array_equal(again.find_marks(context), image(1, number))
 
 
 def test_a_run_can_be_continued_from_a_copy_of_its_context():
