@@ -57,8 +57,10 @@ LEAST_FORCE, LEAST_MOTION = 0.1, 1.0
 
 def world_names(world: WorldSettings | None) -> dict[str, list[str]]:
     """Names of the columns of quantities of the log that have a column for each body."""
-    names = [] if world is None else [f"{name}_m" for name in _bodies(world)]
-    return {} if world is None else {"clearance": names, "cable_clearance": names}
+    if world is None:
+        return {}
+    names = [f"{name}_m" for name in _bodies(world)]
+    return {"clearance": names, "cable_clearance": names}
 
 
 def _bodies(world: WorldSettings) -> list[str]:
@@ -328,11 +330,9 @@ def wrench_numbers(run: Run) -> dict[str, Any]:
 def wrench_figure(run: Run) -> Figure:
     """True and estimated force and moment over time, with three standard deviations of readings."""
     time, estimate, sigma = (run.log[name] for name in ("time", WRENCH_ESTIMATED, WRENCH_SIGMA))
-    true, title = (
-        true_wrench(run.log),
-        "What pushes the platform beside its cables, true and estimated",
-    )
-    figure, panels = new_figure(2, 3, (12.0, 6.4), run.title(title))
+    true = true_wrench(run.log)
+    title = run.title("What pushes the platform beside its cables, true and estimated")
+    figure, panels = new_figure(2, 3, (12.0, 6.4), title)
     for row, (name, _, part) in enumerate(WRENCH_PARTS):
         for k, axis in enumerate("xyz"):
             panel, column = panels[row, k], part.start + k
