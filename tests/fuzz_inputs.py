@@ -36,7 +36,7 @@ from typing import Any
 import cdpr_drake
 from cdpr_drake.analyses import installation, view
 from cdpr_drake.analyses.frame.folder import LOCK
-from cdpr_drake.analyses.front import simulation
+from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.studies.study import STUDIES, Study
 from cdpr_drake.analyses.workspaces.stability import Stability
 from cdpr_drake.cli import app
@@ -87,7 +87,7 @@ def load_all() -> None:
                     import_module(".".join(("cdpr_drake", *words)).removesuffix(".__init__"))
 
 
-PICTURES = ((simulation, "write_pictures"), (Stability, "figures"))
+PICTURES = ((Run, "figures"), (Stability, "figures"))
 """What draws figures, by the module in which it is looked up."""
 
 

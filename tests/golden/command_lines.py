@@ -358,7 +358,7 @@ RUNS = {
         "simulate acrobot_pbvs --camera projected --duration 0.5 --seeds 0:2 --workers 1 --out out"
     ),
     "simulate-reactions": (
-        "simulate acrobot_broken_redistributed --compare-reactions 5 --break-time 0.2 --after 0.3 "
+        "reactions acrobot_broken_redistributed --cable 5 --time 0.2 --after 0.3 "
         "--reactions none,stop --out out"
     ),
     "simulate-refused-key": "simulate acrobot_pbvs --set controller.no_such=1 --out out",
