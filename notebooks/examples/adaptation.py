@@ -51,7 +51,7 @@ for seed in range(count):
     path = cKDTree(approach(seed, 0.0, False).log["X_WP"][:, 4:])
     for distance in (0.01, 0.02):
         learnt, wrong = approach(seed, distance, True), approach(seed, distance, False)
-        row, points = numbers(learnt, path) / numbers(wrong, path), learnt.numbers["adaptation"]
+        row, points = numbers(learnt, path) / numbers(wrong, path), learnt.as_dict()["adaptation"]
         row["error of the points"] = points["points_rms_after_m"] / points["points_rms_before_m"]
         row["largest error over three deviations"] = points["largest_error_in_sigmas"] / 3.0
         row["doubted"] = float(bool(points["doubts"]))

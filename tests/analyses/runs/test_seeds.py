@@ -380,10 +380,10 @@ def test_runs_over_seeds_are_a_folder_and_finished_ones_are_found_again(capsys, 
         _, again, said = repeat("0:2", "0.1", *into)
         assert "2 of 2 runs were there already" in said
         assert again["runs"] == summary["runs"]  # times included: nothing was computed
-    _, more, said = repeat("1:4", "0.1", *into)
+    _, more, said = repeat("3,1,2", "0.1", *into)
     assert "1 of 3 runs were there already" in said
-    assert [one["seed"] for one in more["runs"]] == [1, 2, 3]
-    assert more["runs"][0] == summary["runs"][1]
+    assert [one["seed"] for one in more["runs"]] == [3, 1, 2]
+    assert more["runs"][1] == summary["runs"][1]
     code, _, said = repeat("0:2", "0.2", *into)
     assert (code, "scenario.duration is 0.1 there, 0.2 here" in said) == (2, True)
     assert repeat("0:1", "0.2", *into, "--overwrite")[0] == 0

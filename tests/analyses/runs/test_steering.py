@@ -137,7 +137,7 @@ def test_a_run_by_hand_is_a_run_of_the_scenario_that_is_kept(engine):
     time, tensions = run.log["time"], run.log["tensions"]
     assert np.all(tensions[time > event.time, 2] == 0.0)
     assert np.all(tensions[time < push.start, 2] > 0.0)
-    assert push.start < 0.12
+    assert messages["event"][0]["t"] < push.start < 0.12  # a period under way is not changed
     again = ServoRun(loaded).simulate()
     for name in ("time", "X_WP", "tensions"):
         np.testing.assert_array_equal(again.log[name], run.log[name])
@@ -162,14 +162,15 @@ def test_acts_that_are_not_accepted_are_refused_in_a_line():
     with pytest.raises(ScenarioError, match="break: found it with a scenario without failures"):
         ByHand(scenario()).do(BROKEN, 0.0)
     _, messages = by_hand(
-        scenario(*OPEN), (0.1, {"what": BREAK, "cable": 8}),
+        scenario(*OPEN), (0.05, BROKEN), (0.07, BROKEN), (0.1, {"what": BREAK, "cable": 8}),
         (0.2, {"what": PUSH, "force": [0.0, 0.0, 0.0], "seconds": 0.1}),
         (0.3, {"what": PUSH, "force": [1.0, 0.0, 0.0], "seconds": 1e9}),
     )  # fmt: skip
-    words = [data["refused"] for data in messages["event"]]
-    assert words[0] == "cable: found 8; accepted: 0, 1, 2, 3, 4, 5, 6, 7"
-    assert words[1].startswith("force: found [0.0, 0.0, 0.0]; accepted: three numbers")
-    assert words[2].startswith("seconds: found 1000000000.0; accepted: above 0 to 60 s")
+    words = [data["refused"] for data in messages["event"][1:]]
+    for number in (2, 8):
+        assert words.pop(0) == f"cable: found {number}; accepted: 0, 1, 3, 4, 5, 6, 7"
+    assert words[0].startswith("force: found [0.0, 0.0, 0.0]; accepted: three numbers")
+    assert words[1].startswith("seconds: found 1000000000.0; accepted: above 0 to 60 s")
 
 
 def test_a_loop_and_no_socket_are_refused():
