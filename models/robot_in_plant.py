@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import DivergedError, RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import floating_pose_into
 from cdpr_drake.models.robot_loader import as_robot
@@ -139,13 +140,18 @@ def pose_on_joint(joint: PlatformJoint, state: Any) -> Any:
     """X_WP from the platform's state as the plant's port gives it, shape (13,), (6,) or (2,).
 
     A RigidTransform, or one of AutoDiffXd where the state is an array of these.
+
+    Raises:
+        DivergedError: The quaternion is zero, or its square no finite number.
     """
     if np.asarray(state).dtype == object:
         return _pose_of_any(joint, state)
     if not joint.is_floating:
         return joint.pose_at(state)
     matrix = np.empty((3, 4))
-    floating_pose_into(np.array(state[:7]), matrix)
+    if not 0.0 < floating_pose_into(np.array(state[:7]), matrix) < math.inf:
+        words = ", ".join(f"{number:.3g}" for number in state[:4])
+        raise DivergedError(f"the platform's quaternion ({words}) is no orientation")
     return RigidTransform.MakeUnchecked(matrix)
 
 

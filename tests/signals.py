@@ -139,6 +139,7 @@ def write_inputs(folder: Path) -> None:
     import numpy as np
 
     from tests.cli import test_calibrate, test_identify
+    from tests.cli.commands import write_log
     from tests.identification.logs import log
 
     random_numbers = np.random.default_rng(1)
@@ -148,7 +149,7 @@ def write_inputs(folder: Path) -> None:
     )
     seen = test_calibrate.simulated_poses(poses, 1e-3, 5e-4, random_numbers)
     columns = test_calibrate.length_columns(lengths) | test_calibrate.pose_columns(seen)
-    test_calibrate.write(folder / "poses.csv", columns)
+    write_log(folder / "poses.csv", columns)
     test_identify.write(folder / "motion.csv", *log(span=4.0, **test_identify.NOISE))
     (folder / "design.yaml").write_text(
         "exit_points: {reach: [0.1, 0.1, 0.1]}\ngoals: [{name: static}]\n"

@@ -44,7 +44,7 @@ from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import Camera, check, scenario_with
+from cdpr_drake.analyses.runs.simulate import Camera, say_remarks, scenario_with
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.pose_accuracy import repeatability
@@ -483,11 +483,13 @@ def repeat_run(
         raise ScenarioError(f"seeds: found {list(seeds)}; accepted: different numbers, at least 1")
     loaded, note = set_loop(loaded, True)
     run = ServoRun(loaded)
-    check(run, note, follow)
+    follow.doing(f"{loaded.name}: building the diagram")
+    warnings = run.check()
     arguments = run.arguments()
     del arguments["scenario"]["seed"]
     below = None if follow.results is None else follow.results.parent / "runs"
     with results_folder(loaded.name, arguments, folder, overwrite, below, True) as results:
+        say_remarks(note, warnings, follow)
         runs = run_many(
             with_seeds(loaded, seeds), workers, traces=True, folder=results, follow=follow
         )

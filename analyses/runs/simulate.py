@@ -115,11 +115,13 @@ def simulate(
         follow = replace(follow, prepare=_in_meshcat(run, host or LOCAL, port, follow))
     elif steered_by is not None:
         follow = steered(follow, loaded, steered_by)
-    check(run, note, follow)
+    follow.doing(f"{loaded.name}: building the diagram")
+    warnings = run.check()
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
     if follow.connect is not None and folder is None and follow.results is not None:
         folder = free_folder(follow.results.parent / base, {})  # no such run goes on
     with results_folder(base, arguments, folder, overwrite, follow.results) as results:
+        say_remarks(note, warnings, follow)
         if results is None:
             return run.simulate(None, follow)
         _write_inputs(run, results)
@@ -176,14 +178,8 @@ def finish_run(
     return run
 
 
-def check(run: Run, note: str, follow: Follow) -> None:
-    """Builds a run, and says a note and warnings; Python prints them on stderr if nobody follows.
-
-    Raises:
-        CdprError: It cannot be built.
-    """
-    follow.doing(f"{run.scenario.name}: building the diagram")
-    warnings = run.check()
+def say_remarks(note: str, warnings: Sequence[str], follow: Follow) -> None:
+    """Says a note and warnings of a run; Python prints the warnings on stderr if nobody follows."""
     if follow is NOBODY:
         for warning in warnings:
             _LOG.warning("%s", warning)

@@ -134,14 +134,17 @@ def write_pose(X: RigidTransform, out: Array) -> None:
     out[9:] = matrix[:, 3]
 
 
-@njit(cache=True)
-def floating_pose_into(state: Array, X: Array) -> None:
+@njit(cache=True, error_model="numpy")
+def floating_pose_into(state: Array, X: Array) -> float:
     """X, shape (3, 4) [-, m] <- pose of a floating body.
 
     Args:
         state: Its quaternion (w, x, y, z) of any length but 0, its position [m], and what else
             there is.
-        X: Overwritten.
+        X: Overwritten; no pose if what is returned is 0 or not finite.
+
+    Returns:
+        The square of the quaternion's length.
     """
     square = 0.0
     for i in range(4):
@@ -158,6 +161,7 @@ def floating_pose_into(state: Array, X: Array) -> None:
     X[1, 2], X[2, 1] = sz * y - sx * w, sz * y + sx * w
     for i in range(3):
         X[i, 3] = state[4 + i]
+    return square
 
 
 def logarithm(X: RigidTransform) -> Array:

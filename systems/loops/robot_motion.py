@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pydrake.math import RigidTransform
 
@@ -15,6 +17,7 @@ from cdpr_drake.dynamics.batch_kernel import outputs_address, reach_address
 from cdpr_drake.dynamics.lone_robot_kernel import LoneRobot, move, see_cables
 from cdpr_drake.dynamics.robot_arrays import CREEPING, MOTORS, RUBBING, pack_robot
 from cdpr_drake.dynamics.robot_kernel import INTEGRATION_OK
+from cdpr_drake.errors import DivergedError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import floating_pose_into
 from cdpr_drake.models.robot_schema import Robot
@@ -184,7 +187,8 @@ class RobotMotion:
         """Matrix (3, 4) of X_WP now [-, m]; the same array each time."""
         if not self._posed:
             if self._joint.is_floating:
-                floating_pose_into(self._platform, self._matrix)
+                if not 0.0 < floating_pose_into(self._platform, self._matrix) < math.inf:
+                    raise DivergedError("the platform's quaternion is no orientation any more")
             else:
                 self._matrix[:] = self._joint.pose_at(self._platform).GetAsMatrix34()
             self._posed = True

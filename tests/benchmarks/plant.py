@@ -49,7 +49,7 @@ def benchmark() -> Iterator[Ratio]:
     scenarios = {way: load_scenario(SCENARIO, [*options, word]) for way, word in WAYS.items()}
 
     def run(scenario: Scenario) -> Callable[[], float]:
-        return per_call(lambda: run_many([scenario], 1, keep_traces=True))
+        return per_call(lambda: run_many([scenario], 1, traces=True))
 
     yield from ratios({f"servo run, {way}": run(case) for way, case in scenarios.items()}, 5)
 

@@ -96,6 +96,7 @@ def write_inputs(folder: Path) -> None:
     from tests.analyses.calibration import swings
     from tests.analyses.logs import recorders, test_replay
     from tests.cli import test_calibrate, test_calibrate_camera, test_identify
+    from tests.cli.commands import write_log
     from tests.identification.logs import log
     from tests.vision.boards import board_image, board_poses, make_board
 
@@ -115,24 +116,24 @@ def write_inputs(folder: Path) -> None:
 
     poses = test_calibrate.POSES
     columns = tracked(poses, poses, 1)
-    test_calibrate.write(folder / "tracked.csv", columns)
+    write_log(folder / "tracked.csv", columns)
     jumps = np.random.default_rng(9)
-    test_calibrate.write(folder / "outliers.csv", {
+    write_log(folder / "outliers.csv", {
         name: values + 0.02 * ((jumps.uniform(size=len(values)) < 0.06) & ("length" in name))
         for name, values in columns.items()
     })  # fmt: skip
-    test_calibrate.write(folder / "scaled.csv", {
+    write_log(folder / "scaled.csv", {
         name: values * (1.05 if "length" in name else 1.0) for name, values in columns.items()
     })  # fmt: skip
     time = np.linspace(0.0, 6.0, 121)
     late = tracked([pose(t) for t in time], [pose(t - 0.2) for t in time], 5)
-    test_calibrate.write(folder / "late.csv", {"time_s": time} | late)
+    write_log(folder / "late.csv", {"time_s": time} | late)
     angles = -test_calibrate.simulated_swivels(
         test_calibrate.TRUE, poses[:10], 2e-3, np.random.default_rng(4)
     )
     swivels = test_calibrate.length_columns(lengths(poses, 2e-4, 3)[:10])
     swivels |= {f"C{k + 1}_swivel_rad": angles[:, k] for k in range(8)}
-    test_calibrate.write(folder / "swivels.csv", swivels)
+    write_log(folder / "swivels.csv", swivels)
     nominal = test_calibrate.load_robot("acrobot_small")
     for cable, shift in zip(
         nominal.cables, 0.004 * np.random.default_rng(2).standard_normal((8, 3)), strict=True

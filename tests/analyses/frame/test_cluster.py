@@ -11,6 +11,7 @@ from functools import partial
 import pytest
 
 from cdpr_drake.analyses.frame import cluster as module
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.job import ProcessDied
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.runs.seeds import run_many, with_seeds
@@ -125,13 +126,13 @@ def test_workers_with_other_code_are_refused_by_name(local, monkeypatch):
 def test_runs_over_seeds_are_those_of_this_machine_though_a_worker_dies(local, workers):
     changes = ["camera.kind=projected", "duration=0.1", "integration.loop=compiled"]
     scenarios = with_seeds(load_scenario("acrobot_pbvs", changes), range(6))
-    here = run_many(scenarios, 1, keep_traces=True)
+    here = run_many(scenarios, 1, traces=True)
 
     def kill_one(progress):
         if progress.done == 1:
             os.kill(workers[0], signal.SIGKILL)
 
-    there = run_many(scenarios, local.scheduler_address, kill_one, keep_traces=True)
+    there = run_many(scenarios, local.scheduler_address, traces=True, follow=Follow(kill_one))
     assert [record.seed for record in there.records] == list(range(6))
     for one, other in zip(here.records, there.records, strict=True):
         assert one.end.tobytes() == other.end.tobytes()

@@ -369,8 +369,8 @@ def test_runs_over_seeds_are_a_folder_and_finished_ones_are_found_again(capsys, 
     code, summary, said = repeat("0:2")
     assert code == 0
     assert said.splitlines() == [
-        f"{DEFAULT_SCENARIO}: by the compiled loop (its events in Python, since its tensions are "
-        "managed), as the run is repeated; else with --set integration.loop=diagram"
+        f"{DEFAULT_SCENARIO}: by the compiled loop, as the run is repeated; else with --set "
+        "integration.loop=diagram"
     ]
     assert (summary["seeds"], summary["outcomes"]) == ([0, 1], {"timeout": 2})
     assert {(one["engine"], one["loop"]) for one in summary["runs"]} == {("compiled", "compiled")}

@@ -176,7 +176,15 @@ def test_a_broken_graphics_driver_is_one_line(capsys, here, monkeypatch):
 
 
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
-    words = ("simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.6", *COMPILED)
+    words = (
+        "simulate",
+        "acrobot_pbvs",
+        "--camera",
+        "projected",
+        "--set",
+        "duration=0.6",
+        *COMPILED,
+    )
     out = " ".join(answer(capsys, *words, "--out", "out").split())
     summary = json.loads((here / "out" / "summary.json").read_text())
     assert summary["outcome"] == "timeout"
