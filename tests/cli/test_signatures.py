@@ -33,10 +33,10 @@ OPTIONS = [
     for name, arguments in ARGUMENTS.items() for argument in arguments if is_option(argument)
 ]  # fmt: skip
 ANY_WORD = {
-    "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held", "--
-    host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out", "--
-    parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot", "--runs-
-    from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
+    "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
+    "--host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out",
+    "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
+    "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
