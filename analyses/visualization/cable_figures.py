@@ -87,16 +87,19 @@ def draw_cables(
 
     A cable whose values chatter has a curve of their means, in a pale band between their extremes.
     """
-    count = len(robot.cables)
+    count, bands = len(robot.cables), 0
     for k, cable in enumerate(robot.cables):
         look, phase, chatter = nth_look(k), phase_of(k, count), envelope(values[:, k])
         if chatter is None:
             draw_curve(axes, times, values[:, k], look, cable.name, scale=scale, phase=phase)
             continue
+        bands += 1
         rows, low, means, high = chatter
         band = {"color": look.color, "alpha": BAND_ALPHA, "linewidth": 0.0}
         axes.fill_between(times[rows], scale * low, scale * high, **band)
         draw_curve(axes, times[rows], means, look, cable.name, scale=scale, phase=phase)
+    if bands:
+        axes.fill_between([], [], color="0.8", label="band: extremes,\ncurve in it: means")
 
 
 def _draw_bounds(axes: Any, bounds: tuple[float, float], words: str) -> None:

@@ -139,10 +139,11 @@ def test_tensions_that_chatter_are_a_curve_of_means_in_a_band_of_extremes():
     tensions[:, 2] += chatter
     log = {"time": times, "slack": np.zeros((1501, 8)), "tensions": tensions}
     axes = cable_figure("t", robot, log, "tensions", "tension [N]", bounds=(0.0, 60.0)).axes[0]
-    (band,) = axes.collections
+    band, _ = axes.collections
     extent = band.get_paths()[0].get_extents()
     assert (extent.y0, extent.y1) == (np.min(tensions[:, 2]), np.max(tensions[:, 2]))
     smooth, means = (axes.lines[k].get_ydata() for k in (1, 2))
     np.testing.assert_array_equal(smooth, tensions[:, 1])
     assert np.std(means) < 0.6 * np.std(tensions[:, 2])
-    assert axes.get_legend().get_texts()[2].get_text() == "C3"
+    legend = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert (legend[2], legend[8]) == ("C3", "band: extremes,\ncurve in it: means")
