@@ -148,7 +148,8 @@ def test_errors_of_readings_are_those_at_the_instant_of_the_reading(sensors):
     assert np.max(np.abs(np.diff(sensors.log["tensions"], axis=0))) > 3.0 * vlu850.accuracy
     micrometres = 1e6 * np.pi / 65536 * 0.0041
     assert np.max(np.abs(errors(panels["length"]))) < micrometres * (1.0 + 1e-3)
-    assert errors(panels["metrology"]) == pytest.approx(0.1, abs=0.1)
+    metrology = errors(panels["metrology"])  # of an accuracy of 0.1 mm
+    assert 0.05 < np.min(metrology) < np.max(metrology) < 0.2
     torques = figures["motor_torques"]()
     assert "Torques of the motors and of their friction" in torques.get_suptitle()
     assert [len(axes.get_lines()) for axes in torques.axes] == [8, 10]
