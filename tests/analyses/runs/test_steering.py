@@ -12,6 +12,7 @@ from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.steering import (
     BREAK,
+    FASTEST_SPEED,
     PUSH,
     UNTOUCHED,
     ByHand,
@@ -149,12 +150,18 @@ def test_a_run_that_nobody_touches_is_as_without_and_a_stop_ends_it():
     assert "event" not in messages
     np.testing.assert_array_equal(untouched.log["time"], plain.log["time"])
     np.testing.assert_allclose(untouched.log["X_WP"], plain.log["X_WP"], atol=SPLIT)
-    stopped, _ = by_hand(scenario(*OPEN), (0.2, {"what": "stop"}))
+    fast = {"what": "speed", "factor": 1e9}
+    stopped, messages = by_hand(scenario(*OPEN), (0.1, fast), (0.2, {"what": "stop"}))
+    assert [pace["speed"] for pace in messages["pace"]][:2] == [None, FASTEST_SPEED]
     assert stopped.stopped
     assert 0.2 <= stopped.sim_time < 0.6
 
 
-def test_acts_that_are_not_accepted_are_refused_in_a_line():
+def test_acts_loops_and_sockets_that_are_not_accepted_are_refused_in_a_line():
+    with pytest.raises(CdprError, match="steered_by: found -5; accepted: the number of an open"):
+        steered(NOBODY, scenario(), -5)
+    with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but"):
+        check_steered(scenario("integration.loop=compiled"))
     assert ByHand(scenario()).takes == ()
     # With failures of its own the times of events are fixed.
     failing = "failures={events: [{kind: cable_breaks, time: 0.2, cable: 1}]}"
@@ -171,13 +178,6 @@ def test_acts_that_are_not_accepted_are_refused_in_a_line():
         assert words.pop(0) == f"cable: found {number}; accepted: 0, 1, 3, 4, 5, 6, 7"
     assert words[0].startswith("force: found [0.0, 0.0, 0.0]; accepted: three numbers")
     assert words[1].startswith("seconds: found 1000000000.0; accepted: above 0 to 60 s")
-
-
-def test_a_loop_and_no_socket_are_refused():
-    with pytest.raises(CdprError, match="steered_by: found -5; accepted: the number of an open"):
-        steered(NOBODY, scenario(), -5)
-    with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but"):
-        check_steered(scenario("integration.loop=compiled"))
 
 
 def test_a_run_that_was_acted_on_never_goes_on_from_the_middle(tmp_path):
