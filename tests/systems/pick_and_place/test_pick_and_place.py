@@ -36,12 +36,8 @@ def run():
     return PickAndPlaceRun(load_scenario(NAME, [*SHORT, cover])).simulate()
 
 
-@pytest.fixture(scope="module")
-def summary(run):
-    return run.as_dict()
-
-
-def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run, summary):
+def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run):
+    summary = run.as_dict()
     assert run.outcome == Outcome.COMPLETED, run.message
     assert summary["set_down_error_m"] < ACCEPTED_DISTANCE
     assert summary["set_down_error_rad"] < ACCEPTED_ANGLE
@@ -66,9 +62,7 @@ def test_the_weight_is_on_the_table_then_on_the_platform_then_on_the_table(run):
     assert log["X_WB"][-1, 6] == pytest.approx(0.11, abs=2e-4)
     still = log["X_WB"][times > times[-1] - 0.3, 4:]
     assert np.max(np.ptp(still, axis=0)) < 1e-4
-
-
-def test_words_and_numbers_tell_the_phases(run, summary):
+    summary = run.as_dict()
     assert list(summary["phases"]) == [phase.word for phase in Phase if phase < Phase.DONE]
     whole = sum(span["duration_s"] for span in summary["phases"].values())
     assert whole == pytest.approx(run.sim_time, abs=0.15)

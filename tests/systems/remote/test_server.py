@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 import msgpack
 import numpy as np
@@ -53,10 +53,11 @@ def served(client, *overrides, timeout=LONG, stop=lambda: False):
 @pytest.fixture
 def raw():
     """Connects to an address; what it returns says a message, bytes or for JSON."""
-    with zmq.Context() as context:
+    with zmq.Context() as context, ExitStack() as closing:
 
         def connected(address):
-            socket = context.socket(zmq.REQ, linger=0)
+            socket = closing.enter_context(context.socket(zmq.REQ))
+            socket.setsockopt(zmq.LINGER, 0)
             socket.connect(address)
 
             def say(message, answered=True):
