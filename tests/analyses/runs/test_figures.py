@@ -387,6 +387,7 @@ def test_numbers_of_what_was_learnt_are_those_of_the_log():
         ({"models_rejected": 3.0}, {}, "3 models were rejected by the stability criterion"),
         ({}, {3: 4.0}, "the length of C4 contradicts all else at 4 of 20 poses"),
         ({}, {3: 1.0}, None),  # once may be by chance
+        ({"stations": 100.0}, {3: 5.0}, None),  # and so may some of many
         ({}, {M + 5: 2.0}, "corner 3 of the tag in v contradicts all else at 2 of 20 poses"),
     ],
 )

@@ -22,6 +22,7 @@ from cdpr_drake.analyses.runs.stability import (
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.pan_tilt import turned_mounting
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.stability_watch import StabilityWatch
@@ -192,8 +193,10 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     right = turned([[20.0, -10.0], [20.0, -10.0]])
     assert margin(right) == pytest.approx(margin(criterion))
     wrong = turned([[20.0, 0.0], [0.0, 0.0]])
-    angle = (criterion.camera.inverse() @ wrong.camera).rotation().ToAngleAxis().angle()
-    assert np.degrees(angle) == pytest.approx(20.0)
+    off = criterion.camera.inverse() @ wrong.camera
+    assert np.degrees(off.rotation().ToAngleAxis().angle()) == pytest.approx(20.0)
+    true = turned_mounting(servo.mounting, scenario.camera.pan_tilt, np.radians([20.0, 0.0]))
+    assert true.X_BC.IsNearlyEqualTo(servo.mounting.X_BC @ off, 1e-12)
     assert margin(wrong) < 0.99 * margin(criterion)
     seen = wrong.camera @ wrong.sees(at, 0.0)
     assert seen.IsNearlyEqualTo(criterion.camera @ criterion.sees(at, 0.0), 1e-12)

@@ -43,7 +43,7 @@ def test_the_box_is_set_down_at_the_goal_with_its_tag_hidden_on_the_way(run):
     assert summary["set_down_error_rad"] < ACCEPTED_ANGLE
     assert summary["views"]["hidden_s"] == pytest.approx(0.8, abs=0.05)
     assert 0.7 < summary["views"]["unseen_s"] < 1.2
-    assert summary["grip"]["mean_load_n"] == pytest.approx(WEIGHT, rel=0.05)
+    assert summary["grip"]["mean_load_n"] == pytest.approx(WEIGHT, rel=0.15)
     carried = run.spans()[Phase.CARRY]
     hidden = run.log["time"][run.log["hidden"][:, 0] > 0.0]
     assert carried[0] < hidden[0] < hidden[-1] < carried[1]
