@@ -11,7 +11,6 @@ from .analyses.front.camera_calibration import calibrate_camera as calibrate_cam
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
-from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
@@ -66,6 +65,7 @@ from .systems.batches.batch_robots import BatchRobots as BatchRobots
 from .systems.diagrams.camera import add_camera as add_camera
 from .systems.diagrams.camera import add_target as add_target
 from .systems.diagrams.estimators import add_estimator as add_estimator
+from .systems.diagrams.load import load_scenario as load_scenario
 from .systems.diagrams.servo_blocks import add_visual_servo as add_visual_servo
 from .systems.diagrams.tension_control import add_tension_control as add_tension_control
 from .systems.diagrams.visual_servo import build_visual_servo as build_visual_servo

@@ -177,7 +177,8 @@ def compare_reactions(
     }  # fmt: skip
     arguments = {name: run.arguments() for name, run in runs.items()}
     kept = f"runs/{base.name}-reactions"
-    with results_folder(kept, arguments, folder, overwrite, follow.results) as results:
+    again = folder is not None
+    with results_folder(kept, arguments, folder, overwrite, follow.results, again) as results:
         rows: dict[str, dict[str, Any]] = {}
         if results is not None and (results.path / RESULTS).is_file():
             rows = load_json((results.path / RESULTS).read_text(encoding="utf-8"))["reactions"]

@@ -28,6 +28,7 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
+from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun
@@ -74,7 +75,8 @@ def simulate(
     """Simulates a scenario and writes summary, log, figures and replay.
 
     The same command goes on with a run that was killed or interrupted, in its folder, gives the
-    same numbers as an uninterrupted run, and draws what is missing.
+    same numbers as an uninterrupted run, and draws what is missing. A complete run in a folder that
+    is named is read again, and not simulated.
 
     Args:
         scenario: Scenario by name, path of a YAML file, or folder of a run, to repeat it.
@@ -120,28 +122,39 @@ def simulate(
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
     if follow.connect is not None and folder is None and follow.results is not None:
         folder = free_folder(follow.results.parent / base, {})  # no such run goes on
-    with results_folder(base, arguments, folder, overwrite, follow.results) as results:
+    seen = meshcat or follow.acts or follow.connect is not None
+    again = folder is not None and not seen
+    with results_folder(base, arguments, folder, overwrite, follow.results, again) as results:
         say_remarks(note, warnings, follow)
         if results is None:
             return run.simulate(None, follow)
-        _write_inputs(run, results)
-        with results.writing():
-            parts = results.claim(PARTS)
-            try:
-                run.simulate(results.path, follow)
-            except BaseException:
-                if not parts.exists():  # nothing was simulated
-                    results.discard()
-                raise
-        if follow.acts:  # what was done by hand stands in the scenario now
-            _write_inputs(run, results)
-        run.write(results)
+        complete = run.read(results.path)
+        if complete:
+            follow.say(f"reused the run of {shown_path(results.path)}")
+        else:
+            _simulate_into(results, run, follow)
         if run.outcome != Outcome.INTERRUPTED:
-            run.draw(results, formats, _exports(run, results, exports, video), follow)
+            run.draw(results, formats, _exports(run, results, exports, video), follow, complete)
             run.stopped = follow.stop()
         if not run.stopped and not run.failed:
             run.settle(results)
     return run
+
+
+def _simulate_into(results: Folder, run: Run, follow: Follow) -> None:
+    """Simulates a run, from a checkpoint if there is one, and writes inputs, log and summary."""
+    _write_inputs(run, results)
+    with results.writing():
+        parts = results.claim(PARTS)
+        try:
+            run.simulate(results.path, follow)
+        except BaseException:
+            if not parts.exists():  # nothing was simulated
+                results.discard()
+            raise
+    if follow.acts:  # what was done by hand stands in the scenario now
+        _write_inputs(run, results)
+    run.write(results)
 
 
 @verb()
@@ -166,7 +179,7 @@ def finish_run(
     marker = read_marker(path)
     if marker is None or marker["complete"] or not (path / PARTS).is_dir():
         raise OutputFolderError(f"{folder}: found no log of an interrupted run; accepted: one")
-    scenario = load_scenario(str(path / "scenario.yaml"))
+    scenario = load_scenario(path / "scenario.yaml")
     run = KINDS[scenario.kind](scenario)
     _check_options(run, video)
     with Folder(path, marker["arguments"]) as results:
@@ -174,7 +187,7 @@ def finish_run(
         run.draw(results, formats, _exports(run, results, exports, video), follow)
         run.stopped = follow.stop()
         if not run.stopped:
-            run.settle(results)
+            run.settle(results, interrupted_at_s=run.sim_time)
     return run
 
 

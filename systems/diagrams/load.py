@@ -24,6 +24,7 @@ from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
+from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.systems.controllers.force_tracking import check_force_control
 from cdpr_drake.systems.diagrams.mechanism_control import check_mechanism_scenario
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
@@ -234,17 +235,17 @@ SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] 
 as `kind`."""
 
 
+@inputs_read_once()
 def load_scenario(
-    name: str, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
+    name: str | Path, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
 ) -> Any:
-    """Reads a scenario by name or by path to a YAML file, and checks it against its robot
-    or mechanism.
+    """Reads a scenario, and checks it against its robot or mechanism.
 
     Args:
-        name: Name or path.
+        name: A name of `scenario_names()`, the path of a YAML file, or the folder of a run.
         overrides: Items "key.subkey=value" that replace what the file says.
-        schema: Dataclass to read it into, in the place of its kind's: a subclass that has more
-            sections.
+        schema: Class that it is read into: a subclass, with more sections, of its kind's; None:
+            its kind's.
 
     Returns:
         A `Scenario`, `TensionScenario`, `PickAndPlaceScenario` or `MechanismScenario`, as the
@@ -254,6 +255,7 @@ def load_scenario(
         ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
         RobotFileError: Its robot's file does not describe a possible robot.
     """
+    name = str(name)
     kind = scenario_kind(name)
     of_kind, check = SCENARIO_SCHEMAS[kind]
     if schema is not None and not issubclass(schema, of_kind):
