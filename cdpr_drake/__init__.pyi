@@ -24,6 +24,7 @@ from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_mot
 from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
+from .analyses.runs.scenarios import load_scenario as load_scenario
 from .analyses.runs.seeds import repeat_run as repeat_run
 from .analyses.runs.seeds import run_many as run_many
 from .analyses.runs.serve import serve as serve
@@ -65,7 +66,6 @@ from .systems.batches.batch_robots import BatchRobots as BatchRobots
 from .systems.diagrams.camera import add_camera as add_camera
 from .systems.diagrams.camera import add_target as add_target
 from .systems.diagrams.estimators import add_estimator as add_estimator
-from .systems.diagrams.load import load_scenario as load_scenario
 from .systems.diagrams.servo_blocks import add_visual_servo as add_visual_servo
 from .systems.diagrams.tension_control import add_tension_control as add_tension_control
 from .systems.diagrams.visual_servo import build_visual_servo as build_visual_servo

@@ -28,8 +28,9 @@ from cdpr_drake.analyses.frame.words import (
     whole,
 )
 from cdpr_drake.analyses.runs.breaks import REACTIONS, after_break
+from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import Camera, scenario_with
+from cdpr_drake.analyses.runs.simulate import Camera
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json

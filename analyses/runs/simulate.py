@@ -33,18 +33,16 @@ from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun
 from cdpr_drake.analyses.runs.run import Run
+from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.servo_figures import FILM, write_film
 from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.errors import OutputFolderError, ScenarioError
-from cdpr_drake.models.mechanism_schema import Mechanism
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import MECHANISM, TENSION_CONTROL, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 _LOG = logging.getLogger(__name__)
@@ -198,32 +196,6 @@ def say_remarks(note: str, warnings: Sequence[str], follow: Follow) -> None:
             _LOG.warning("%s", warning)
     for line in [*filter(None, [note]), *(f"warning: {warning}" for warning in warnings)]:
         follow.say(line)
-
-
-def scenario_with(
-    scenario: Any, overrides: Sequence[str] = (), *, camera: str | None = None,
-    duration: float | None = None, seed: int | None = None, log_rate: float | None = None,
-) -> Any:  # fmt: skip
-    """A scenario by name, file or folder, with the settings that have arguments of their own.
-
-    Raises:
-        ScenarioError: It is unknown, malformed, a robot, or loaded already and there are settings.
-    """
-    settings = {"camera.kind": camera, "duration": duration, "seed": seed, "log_rate": log_rate}
-    items = [f"{key}={value}" for key, value in settings.items() if value is not None]
-    if isinstance(scenario, Robot | Mechanism):
-        raise ScenarioError(
-            f"scenario: found the robot {scenario.name}; accepted: a scenario, which names a "
-            "robot; solve_tensions, compute_workspace, assess_stability and view take robots"
-        )
-    if not isinstance(scenario, str | Path):
-        if items or overrides:
-            raise ScenarioError("scenario: found a loaded one with overrides; accepted: its name")
-        return scenario
-    name = str(scenario)
-    if camera is not None and scenario_kind(name) in (TENSION_CONTROL, MECHANISM):
-        raise ScenarioError(f"camera: found with {name}, which has no camera; accepted: without")
-    return load_scenario(name, [*overrides, *items])
 
 
 def _check_options(

@@ -24,7 +24,6 @@ from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
-from cdpr_drake.schema.input_files import inputs_read_once
 from cdpr_drake.systems.controllers.force_tracking import check_force_control
 from cdpr_drake.systems.diagrams.mechanism_control import check_mechanism_scenario
 from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
@@ -235,7 +234,6 @@ SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] 
 as `kind`."""
 
 
-@inputs_read_once()
 def load_scenario(
     name: str | Path, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
 ) -> Any:
