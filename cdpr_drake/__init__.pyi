@@ -11,7 +11,6 @@ from .analyses.front.camera_calibration import calibrate_camera as calibrate_cam
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
-from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
@@ -25,6 +24,7 @@ from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_mot
 from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
+from .analyses.runs.scenarios import load_scenario as load_scenario
 from .analyses.runs.seeds import repeat_run as repeat_run
 from .analyses.runs.seeds import run_many as run_many
 from .analyses.runs.serve import serve as serve

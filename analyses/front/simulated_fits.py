@@ -210,7 +210,7 @@ def identify_in_simulation(
 
 
 def _loaded(scenario: Any) -> Any:
-    return load_scenario(str(scenario)) if isinstance(scenario, str | Path) else scenario
+    return load_scenario(scenario) if isinstance(scenario, str | Path) else scenario
 
 
 def _refused(scenario: Any, accepted: str) -> ScenarioError:

@@ -56,7 +56,7 @@ class FinishedRun:
                 f"{folder.name}: holds no results of a run; accepted: a folder of cdpr simulate"
             )
         check_moves_robot(str(folder / SCENARIO), "the studio")
-        self.scenario = load_scenario(str(folder / SCENARIO))
+        self.scenario = load_scenario(folder / SCENARIO)
         robot = load_robot(self.scenario.robot)
         self.cables = [cable.name for cable in robot.cables]
         self.limits = shown_limits(self.scenario, robot)

@@ -86,11 +86,11 @@ def test_the_command_goes_on_where_it_was_stopped_and_says_the_same(compared, ca
     words = {"overrides": SHORT, "reactions": ("none", "stop"), "folder": here / "out", **BREAK}
     with pytest.raises(StoppedError, match="stopped after 1 of 2 reactions"):
         cdpr.compare_reactions(follow=follow, **words)
-    numbers = told(
-        capsys, "reactions", "--cable", "5", "--time", "0.3", "--after", "0.3", "--reactions",
-        "none,stop", "--set", *SHORT, "--out", "out",
-    )  # fmt: skip
+    command = ("reactions", "--cable", "5", "--time", "0.3", "--after", "0.3", "--reactions",
+               "none,stop", "--set", *SHORT, "--out", "out")  # fmt: skip
+    numbers = told(capsys, *command)
     assert numbers == compared.as_dict()
+    assert told(capsys, *command) == numbers  # of a folder that is complete
     assert json.loads((here / "out" / "results.json").read_text()) == numbers
     assert (here / "out" / "reactions.png").is_file()
 

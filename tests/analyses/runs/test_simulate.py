@@ -17,6 +17,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame import words as argument_words
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs import log, simulate
+from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.servo_figures import error_figure
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.kernel_cache.kernel_list import needed_kernels
@@ -282,7 +283,6 @@ def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_fig
     assert "scenario.seed is 0 there, 5 here; name another folder or add --overwrite" in asked
     assert ended(*words, "--out", "out") == 0
     same_files(here / "whole", here / "out")
-    assert "holds complete results of this command" in refuse(capsys, *words, "--out", "out")
 
     class EndedError(BaseException):
         """The process ends while figures are drawn."""
@@ -297,6 +297,53 @@ def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_fig
     assert (here / "drawn" / "summary.json").is_file()
     assert ended(*words, "--out", "drawn") == 0
     same_files(here / "whole", here / "drawn")
+
+
+KINDS = {
+    "servo": SERVO, "tensions": TENSIONS,
+    "pick and place": ("simulate", "acrobot_pick_and_place", "--camera", "projected",
+                       "--duration", "0.2"),
+    "mechanism": ("simulate", "cable_arm_computed_torque", "--duration", "0.1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", KINDS.values(), ids=KINDS)
+def test_a_complete_run_is_read_again_and_what_is_missing_is_drawn(
+    words, here, capsys, monkeypatch
+):
+    with only("replay.html"):
+        numbers = told(capsys, *words, "--out", "whole")
+    with only("none"):
+        told(capsys, *words, "--out", "out")
+    monkeypatch.setattr(Run, "simulate", None)  # nothing is simulated
+    before = (here / "out" / "log.npz").stat()
+    with only("replay.html"):
+        code, out, err = run(capsys, *words, "--out", "out", "--json")
+    assert (code, "reused the run of out" in err) == (0, True)
+    again = json.loads(out)
+    for summary in (numbers, again):
+        del summary["wall_time_s"], summary["realtime_factor"]
+    assert again == numbers
+    same_files(here / "whole", here / "out")
+    assert (here / "out" / "log.npz").stat() == before
+    drawn = (here / "out" / "replay.html").stat()
+    with only(".mat", "replay.html"):
+        table = answer(capsys, *words, "--out", "out", "--log-format", "mat")
+        assert table == answer(capsys, *words, "--out", "out", "--plot", "figure.svg")
+    assert (here / "out" / "replay.html").stat() == drawn
+    assert (here / "out" / "log.mat").is_file()
+    assert (here / "figure.svg").is_file()
+
+
+@pytest.mark.usefixtures("without_figures")
+def test_a_run_without_all_its_files_is_simulated_again(here):
+    assert ended(*SERVO, "--out", "whole") == 0
+    for name in ("log.csv", "log.npz", "summary.json"):
+        shutil.copytree(here / "whole", here / "out")
+        (here / "out" / name).unlink()
+        assert ended(*SERVO, "--out", "out") == 0
+        same_files(here / "whole", here / "out")
+        shutil.rmtree(here / "out")
 
 
 @pytest.mark.usefixtures("without_figures")
@@ -316,6 +363,8 @@ def test_an_interrupted_run_is_found_without_out_and_is_finished_by_its_name(her
             np.testing.assert_array_equal(part[name], whole[name][: len(part[name])])
     assert not (here / "left" / log.PARTS).exists()
     assert "left: found no log of an interrupted run" in refuse(capsys, "finish", "left")
+    said = refuse(capsys, "simulate", *words, "--duration", "0.4", "--out", "left")
+    assert "left: holds other results: interrupted_at_s is 0.2 there, not here; name" in said
 
 
 @pytest.mark.usefixtures("without_figures")
