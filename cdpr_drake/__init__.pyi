@@ -4,8 +4,10 @@ from .analyses.environments import environment_names as environment_names
 from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
 from .analyses.exchange import import_robot as import_robot
+from .analyses.fits.calibration import calibrate as calibrate
+from .analyses.fits.campaign import calibrate_campaign as calibrate_campaign
+from .analyses.fits.fit import Fit as Fit
 from .analyses.frame.follow import Follow as Follow
-from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
 from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
@@ -13,7 +15,6 @@ from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
 from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
-from .analyses.front.simulated_fits import calibrate_in_simulation as calibrate_in_simulation
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.calibration.calibration_request import TagPlace
 from cdpr_drake.analyses.calibration.columns import UNITS, Column, read_header, split_unit
 from cdpr_drake.analyses.calibration.log_file import (
     ParsedColumns,
@@ -15,6 +14,7 @@ from cdpr_drake.analyses.calibration.log_file import (
     parse_poses,
     split_cells,
 )
+from cdpr_drake.analyses.fits.setup import TagPlace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 
