@@ -12,7 +12,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.tag_file import read_tags
+from cdpr_drake.analyses.calibration.tag_file import TagPlace, read_tags
 from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot
 from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, kept_fit, notes_table
@@ -30,7 +30,6 @@ from cdpr_drake.analyses.fits.setup import (
     CalibrationTask,
     Setup,
     Sigmas,
-    TagPlace,
     default_unknown,
     is_homing,
     prepare,

@@ -20,6 +20,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.tag_file import TagPlace
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model, find_mount
 from cdpr_drake.analyses.fits.calibration import (
     Calibration,
@@ -30,7 +31,7 @@ from cdpr_drake.analyses.fits.calibration import (
 )
 from cdpr_drake.analyses.fits.fit import ROBOT, Fit, kept_fit
 from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
-from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas, TagPlace
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker, wound_lengths
+from cdpr_drake.analyses.calibration.tag_file import TagPlace
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model, find_mount
 from cdpr_drake.analyses.fits.poses import on_motion, plane_normal
 from cdpr_drake.arrays import Array
@@ -31,22 +32,6 @@ from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.vision.apriltags import TagTarget
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
-
-
-class TagPlace(NamedTuple):
-    """A tag in the world.
-
-    Attributes:
-        size: Its edge [m].
-        X_WT: Its pose [m]; None if it is unknown.
-        sigma_place: Standard deviation of each coordinate of that pose [m]; 0 if it is exact.
-        sigma_turn: Standard deviation of its turn about each axis [rad].
-    """
-
-    size: float
-    X_WT: RigidTransform | None = None
-    sigma_place: float = 0.0
-    sigma_turn: float = 0.0
 
 
 @dataclass(frozen=True)
