@@ -376,6 +376,12 @@ def write_result(
     results.complete()
 
 
+def shown_path(folder: Path) -> Path:
+    """A path as users read it: from the working folder if it lies below."""
+    here = Path.cwd().resolve()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder
+
+
 def is_locked(folder: Path) -> bool:
     """True if a process writes a results folder."""
     lock = FileLock(folder / LOCK)

@@ -41,12 +41,6 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 """What fails when a file is written that was opened before, and then has no name."""
 
 
-def shown_path(folder: Path) -> Path:
-    """A path as it is shown: from the working folder, where it lies below it."""
-    here = Path.cwd().resolve()
-    return folder.relative_to(here) if folder.is_relative_to(here) else folder
-
-
 class ResultsFolder:
     """A results folder in the making.
 

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from cdpr_drake.analyses.frame.folder import shown_path
 from cdpr_drake.analyses.frame.words import Formats, OutFolder, one_of, words
 from cdpr_drake.analyses.front.camera_calibration import RATE
 from cdpr_drake.analyses.front.camera_calibration import calibrate_camera as run_calibration
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.cli.log_options import results_below_runs
 from cdpr_drake.cli.sessions import Answer, failures, fit_session
 from cdpr_drake.errors import CdprError

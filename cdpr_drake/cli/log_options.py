@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
+from cdpr_drake.analyses.frame.folder import shown_path
 from cdpr_drake.analyses.frame.words import one_of, words
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot
 from cdpr_drake.analyses.logs.log_formats import AUTO, LOG_READERS
@@ -17,7 +18,6 @@ from cdpr_drake.analyses.logs.log_request import (
     read_mapping,
 )
 from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.cli.process import MISFIT
 from cdpr_drake.cli.sessions import Answer, FollowedSession, failures
 from cdpr_drake.errors import CdprError

@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.analyses.frame.folder import shown_path
 from cdpr_drake.analyses.frame.follow import Follow, Progress
 from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.front.session import Session
-from cdpr_drake.analyses.reporting.output_folder import ResultsFolder, shown_path
+from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
 from cdpr_drake.cli.terminal import message_console
 from cdpr_drake.errors import CdprError
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import free_folder
+from cdpr_drake.analyses.frame.folder import free_folder, shown_path
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.words import (
     Formats,
@@ -19,7 +19,6 @@ from cdpr_drake.analyses.frame.words import (
     one_of,
     whole,
 )
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.tables import frame_table
 from cdpr_drake.analyses.studies.report import print_pdf
 from cdpr_drake.analyses.studies.report import reproduce as reproduce_all
