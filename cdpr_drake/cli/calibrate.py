@@ -16,12 +16,12 @@ from cdpr_drake.analyses.frame.words import (
     named_values,
     pose,
     whole,
+    whole_pair,
     words,
 )
 from cdpr_drake.analyses.front.calibration import calibrate as run_calibration
 from cdpr_drake.analyses.front.simulated_fits import POSES, calibrate_in_simulation
 from cdpr_drake.calibration.parameters import GROUPS
-from cdpr_drake.cli.calibrate_camera import whole_pair
 from cdpr_drake.cli.log_options import check_campaign, fit_answer, results_below_runs, robot_and_log
 from cdpr_drake.cli.option_names import named_options
 from cdpr_drake.cli.sessions import Answer, fit_session, refuse

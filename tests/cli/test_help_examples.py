@@ -45,7 +45,7 @@ LONG_WORK = {
         "cdpr_drake.analyses.front.calibration.calibrate_log",
         "cdpr_drake.analyses.front.simulated_fits.run_campaign",
     ],
-    "calibrate-camera": ["cdpr_drake.analyses.front.camera_calibration.find_boards"],
+    "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
     "identify": [
         "cdpr_drake.analyses.front.calibration.identify_log",
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
