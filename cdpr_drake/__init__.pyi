@@ -5,11 +5,11 @@ from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
 from .analyses.exchange import import_robot as import_robot
 from .analyses.fits.calibration import calibrate as calibrate
+from .analyses.fits.camera import calibrate_camera as calibrate_camera
 from .analyses.fits.campaign import calibrate_campaign as calibrate_campaign
 from .analyses.fits.fit import Fit as Fit
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import identify as identify
-from .analyses.front.camera_calibration import calibrate_camera as calibrate_camera
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
@@ -88,4 +88,3 @@ from .tensions.methods import distribute as distribute
 from .tensions.problem import TensionProblem as TensionProblem
 from .tensions.problem import TensionSolution as TensionSolution
 from .version import __version__ as __version__
-from .vision.calibration_boards import CalibrationBoard as CalibrationBoard

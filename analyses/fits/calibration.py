@@ -60,6 +60,7 @@ from cdpr_drake.analyses.frame.words import (
     named_values,
     pose,
     whole,
+    whole_pair,
     words,
 )
 from cdpr_drake.analyses.reporting.log_files import finite
@@ -96,10 +97,10 @@ UNKNOWN_ZERO = (
 
 
 def _image_size(word: str) -> tuple[int, int]:
-    width, _, height = word.partition("x")
-    if min(int(width), int(height)) < LEAST_IMAGE:
+    size = whole_pair(word)
+    if min(size) < LEAST_IMAGE:
         raise ValueError(word)
-    return int(width), int(height)
+    return size
 
 
 Values = Mapping[str, float] | None

@@ -67,7 +67,7 @@ class Fit(Result):
         model: The fitted `Robot` or `Camera`.
         status: How the search ended, or `MISFIT`.
         unknowns: The fitted parameters.
-        spread: Residuals over sigma, root mean square.
+        spread: Residuals over sigma, root mean square; None if the residuals tell sigma.
         residuals: Numbers by kind of measurement, such as `count` and `rms_sigmas`.
         misfit: Reasons why it is no fit, in words; empty if it is one.
         covariance: Of the unknowns, shape (f, f); None if it is not computed.
@@ -89,7 +89,7 @@ class Fit(Result):
     model: Any
     status: str
     unknowns: tuple[Unknown, ...]
-    spread: float
+    spread: float | None
     residuals: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     misfit: tuple[str, ...] = ()
     covariance: Array | None = None
@@ -129,12 +129,13 @@ class Fit(Result):
         """All numbers for JSON."""
         numbers: dict[str, Any] = {
             "status": self.status,
-            "residuals_over_sigma": finite(self.spread),
-            "misfit_factor": MISFIT_FACTOR,
             "parameters": [unknown.as_dict() for unknown in self.unknowns],
             "remarks": list(self.remarks),
             "versions": package_versions(),
         }
+        if self.spread is not None:
+            numbers["residuals_over_sigma"] = finite(self.spread)
+            numbers["misfit_factor"] = MISFIT_FACTOR
         if self.covariance is not None and self.correlation is not None:
             numbers["covariance"] = finite(self.covariance.tolist())
             numbers["correlation"] = finite(self.correlation.tolist())

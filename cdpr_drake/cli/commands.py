@@ -198,7 +198,7 @@ COMMANDS = {
          "cdpr calibrate-campaign acrobot_sensors --poses 8 --next 3"),
     ),
     "calibrate-camera": Command(
-        _MACHINES, f"{_CLI}.calibrate_camera:calibrate_camera",
+        _MACHINES, f"{_VERBS}.fits.camera:calibrate_camera",
         "Finds a camera's intrinsic parameters and its lens in images of a board.",
         ("cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025",
          "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye"),

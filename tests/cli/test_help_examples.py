@@ -43,7 +43,7 @@ LONG_WORK = {
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],
     "calibrate": ["cdpr_drake.analyses.fits.calibration.fit_robot"],
     "calibrate-campaign": ["cdpr_drake.analyses.fits.campaign.kept_fit"],
-    "calibrate-camera": ["cdpr_drake.analyses.front.camera_calibration.find_boards"],
+    "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
     "identify": [
         "cdpr_drake.analyses.front.calibration.identify_log",
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",

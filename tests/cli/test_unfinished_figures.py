@@ -63,7 +63,23 @@ def told(name):
     return {key: told[key] for key in told.keys() - {"wall_time_s", "files"}}
 
 
-@pytest.mark.parametrize("asked", [fitted, seen])
+@pytest.mark.parametrize("asked", [seen])
+def test_a_fit_that_stops_before_its_figures_keeps_its_numbers(asked, here, monkeypatch, capsys):
+    words = asked(here)
+    with monkeypatch.context() as patch:
+        patch.setattr("cdpr_drake.analyses.frame.figures.figure_writers", end_at_once)
+        with pytest.raises(Ended):
+            ended(*words)
+    names = [name for name in os.listdir("fit") if name.endswith((".json", ".yaml"))]
+    numbers = {name: told(name) for name in names if not name.startswith(".")}
+    assert len(numbers) == 2
+    assert ended(*words) == 0
+    assert any(name.endswith(".png") for name in os.listdir("fit"))
+    assert {name: told(name) for name in numbers} == numbers
+    assert "--overwrite" in refuse(capsys, *words)
+
+
+@pytest.mark.parametrize("asked", [fitted])
 def test_a_fit_that_ends_while_its_figures_are_drawn_is_made_again(asked, here, monkeypatch):
     words = asked(here)
     with monkeypatch.context() as patch:
