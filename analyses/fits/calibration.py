@@ -20,7 +20,6 @@ from cdpr_drake.analyses.fits.prediction import (
     EACH,
     NEXT_POSES,
     HeldOut,
-    HeldRow,
     held_groups,
     next_poses,
     predicted,
@@ -37,7 +36,6 @@ from cdpr_drake.analyses.fits.setup import (
 )
 from cdpr_drake.analyses.fits.starts import BestFit, Tie, best_of_starts
 from cdpr_drake.analyses.fits.verdict import (
-    Refit,
     doubts,
     impossible_poses,
     misfits,
@@ -66,7 +64,7 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.fit_groups import GroupFault, group_faults
+from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.calibration.result import CalibrationResult, Outlier
 from cdpr_drake.errors import CalibrationError, accepted_names
@@ -306,15 +304,15 @@ def fit_robot(
             if turned:
                 raise CalibrationError(f"{problem}; {turned[0]}") from problem
         raise
-    result, groups = best.result, group_faults(best.problem, best.result)
+    result, groups = best.result, best.groups
     up = setup.first.rotation().matrix()[:, 2]
     misfit = (*impossible_poses(task.robot, result, up)[0], *misfits(result, groups))
     if misfit:
         say("Looking for signs that are turned")
-        misfit = (*turned_sensors(task, result, groups, _refitted), *misfit)
+        misfit = (*turned_sensors(task, best, _refitted), *misfit)
         result = replace(result, status=MISFIT)
     result, enlarged = with_enlarged_deviations(result, groups)
-    remarks = doubts(setup, best, groups, enlarged)
+    remarks = doubts(setup, best, enlarged)
     return Calibration(setup, result, misfit, tuple(remarks), best.ties, groups)
 
 
@@ -327,25 +325,26 @@ def _best_fit(
     return setup, best_of_starts(setup, say, others)
 
 
-def _refitted(task: CalibrationTask) -> Refit:
+def _refitted(task: CalibrationTask) -> BestFit:
     """A fit from one start, to try what may be wrong of a log."""
-    _, best = _best_fit(task, others=False)
-    return Refit(best.result, group_faults(best.problem, best.result))
+    return _best_fit(task, others=False)[1]
 
 
 def _held_out(task: CalibrationTask, hold_out: str | int, say: Say) -> Calibration:
     """A calibration on some rows, the others predicted; or on all, each held out once."""
     whole_log = prepare(task)
-    rows: list[HeldRow] = []
+    errors = []
     groups = held_groups(hold_out, task.log, whole_log.zeroed and task.zero is not None)
     for number, group in enumerate(groups):
         say(f"Calibrating without rows, {number + 1} of {len(groups)}")
         kept = np.setdiff1d(np.arange(task.log.count), group)
         calibration = fit_robot(replace(task, log=task.log.only(kept)))
-        rows += predicted(whole_log, calibration.result, kept.tolist(), group)
-    if len(groups) == 1 and str(hold_out) != EACH:
-        return replace(calibration, held=HeldOut(tuple(rows), tuple(kept.tolist())))
-    return replace(fit_robot(task, None, say), held=HeldOut(tuple(rows), ()))
+        errors.append(predicted(whole_log, calibration.result, kept, group))
+    if len(groups) > 1 or str(hold_out) == EACH:
+        calibration, kept = fit_robot(task, None, say), kept[:0]
+    distances, angles = np.concatenate(errors).T
+    held = HeldOut(np.concatenate(groups), distances, angles, kept)
+    return replace(calibration, held=held)
 
 
 def calibration_fit(calibration: Calibration) -> Fit:

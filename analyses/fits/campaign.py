@@ -415,14 +415,23 @@ def _campaign_fit(
             believing = calibrated_scenario(scene, recorded, calibration, str(file))
             write_run_inputs(folder, believing, scene.robot)
 
-    campaign = {**point_errors(scene, calibration), "remarks": list(recorded.remarks)}
-    table = Table(
-        f"Servo {scene.scenario.name}", ("robot believed in", "outcome", "off line [mm]"),
-        [(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
-         for who, row in trials.items()],
-    )  # fmt: skip
+    errors = point_errors(scene, calibration)
+    tables = [
+        Table(
+            "Points, distance from the true robot, rms", ("points", "before [mm]", "after [mm]"),
+            [(f"{points} points",
+              *(f"{1e3 * errors[f'{points}_points_{when}_m']:.3g}" for when in ("before", "after")))
+             for points in ("exit", "anchor")],
+        ),
+        Table(
+            f"Servo {scene.scenario.name}", ("robot believed in", "outcome", "off line [mm]"),
+            [(who, str(row["outcome"]), f"{1e3 * float(row['off_line_m']):.2f}")
+             for who, row in trials.items()],
+        ),
+    ]  # fmt: skip
+    campaign = {**errors, "remarks": list(recorded.remarks)}
     return replace(
-        fit.with_more([table], details={"campaign": campaign, "servo": trials}),
+        fit.with_more(tables, details={"campaign": campaign, "servo": trials}),
         model_file=BELIEVED_FILE, writer=write,
     )  # fmt: skip
 

@@ -91,8 +91,8 @@ def row_figure(fit: Fit) -> Figure:
     result, held = fit.result, fit.held_out
     figure, axes = new_figure(1, 2, (13.0, 5.0), f"{fit.title}, row by row")
     numbers = np.arange(1, result.stations.count + 1)
-    if held is not None and held.fitted:
-        numbers = np.asarray(held.fitted) + 1
+    if held is not None and len(held.fitted):
+        numbers = held.fitted + 1
     for n, (kind, values) in enumerate(result.by_row.items()):
         look, seen = nth_look(n), np.isfinite(values)
         axes[0].plot(

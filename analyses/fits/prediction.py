@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,54 +49,41 @@ FRAMES_KNOWN = 1e-4
 tell nothing of it either, and it changes no choice."""
 
 
-class HeldRow(NamedTuple):
-    """A row that was predicted.
-
-    Attributes:
-        row: Its number, from 0.
-        X_WP: Pose by what the robot measures of itself [m].
-        distance: Distance from there to the tracker's position [m].
-        angle: Turn of the tracker's pose against it [rad]; NaN if it tells no rotation.
-    """
-
-    row: int
-    X_WP: RigidTransform
-    distance: float
-    angle: float
-
-
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Rows that were compared with a fit to others.
+    """Rows that were predicted by a fit to others.
 
     Attributes:
-        rows: The rows, in the order of the log.
-        fitted: Numbers of the fitted rows, from 0; empty if each row was held out once.
+        rows: Numbers of the rows, from 0.
+        distances: Distances from where the robot's own measurements put the tracker's marker to
+            where the tracker saw it, shape (r,) [m].
+        angles: Turns of the tracker's poses against them, shape (r,) [rad]; NaN if it tells none.
+        fitted: Numbers of the fitted rows, from 0; none if each row was held out once.
     """
 
-    rows: tuple[HeldRow, ...]
-    fitted: tuple[int, ...]
+    rows: npt.NDArray[np.intp]
+    distances: Array
+    angles: Array
+    fitted: npt.NDArray[np.intp]
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON; rows count from 1."""
-        distances = np.array([row.distance for row in self.rows])
-        angles = np.array([row.angle for row in self.rows])
         return {
-            "compared_rows": [row.row + 1 for row in self.rows],
-            "fitted_rows": [k + 1 for k in self.fitted],
-            "each_held_out_once": not self.fitted,
-            "distance_m": distances.tolist(),
-            "distance_median_m": float(np.median(distances)),
-            "distance_rms_m": float(np.sqrt(np.mean(distances**2))),
-            "distance_largest_m": float(np.max(distances)),
-            "angle_rad": angles.tolist() if np.isfinite(angles).all() else None,
+            "compared_rows": (self.rows + 1).tolist(),
+            "fitted_rows": (self.fitted + 1).tolist(),
+            "each_held_out_once": not len(self.fitted),
+            "distance_m": self.distances.tolist(),
+            "distance_median_m": float(np.median(self.distances)),
+            "distance_rms_m": float(np.sqrt(np.mean(self.distances**2))),
+            "distance_largest_m": float(np.max(self.distances)),
+            "angle_rad": self.angles.tolist() if np.isfinite(self.angles).all() else None,
         }
 
     def words(self) -> str:
         """In one line."""
         numbers = self.as_dict()
         median, rms, most = (1e3 * numbers[f"distance_{k}_m"] for k in ("median", "rms", "largest"))
-        on = f"{len(self.fitted)} others" if self.fitted else "all others, each in turn"
+        on = f"{len(self.fitted)} others" if len(self.fitted) else "all others, each in turn"
         return (
             f"{len(self.rows)} rows were not fitted but predicted by a fit on {on}: "
             f"{median:.3g} mm off in the median, {rms:.3g} mm rms, {most:.3g} mm at most"
@@ -154,9 +140,10 @@ def tracked_rows(log: CalibrationLog) -> npt.NDArray[np.intp]:
 
 
 def predicted(
-    setup: Setup, result: CalibrationResult, fitted: Sequence[int], rows: npt.NDArray[np.intp]
-) -> list[HeldRow]:
-    """Poses of rows by what the robot measures of itself, beside those of the tracker.
+    setup: Setup, result: CalibrationResult, fitted: npt.NDArray[np.intp],
+    rows: npt.NDArray[np.intp],
+) -> Array:  # fmt: skip
+    """Errors of rows, distance and angle, shape (r, 2) [m, rad], as `HeldOut` has them.
 
     Args:
         setup: The whole log.
@@ -165,8 +152,8 @@ def predicted(
         rows: The rows that are predicted.
     """
     log, model = setup.task.log, result.model
-    count, freedom, order = log.count, setup.freedom, np.asarray(fitted)
-    near = [np.argsort(np.abs(order - row), kind="stable")[: 2 * NEAR] for row in rows]
+    count, freedom = log.count, setup.freedom
+    near = [np.argsort(np.abs(fitted - row), kind="stable")[: 2 * NEAR] for row in rows]
     whole = np.repeat(np.arange(len(rows)), [len(starts) for starts in near])
     program = CalibrationProgram(model, [setup.first] * count, (), motion=freedom.motion)
     tensions = setup.guessed_tensions([setup.first] * count) if setup.rest else None
@@ -182,14 +169,12 @@ def predicted(
     held = []
     for n, row in enumerate(rows.tolist()):
         mine = np.flatnonzero(whole == n)
-        X = poses[int(mine[np.argmin(ends.costs[mine])])]
-        marker = X @ model.X_PM
+        marker = poses[int(mine[np.argmin(ends.costs[mine])])] @ model.X_PM
         angle = float("nan")
         if log.poses is not None:
             angle = pose_error(marker, model.X_WK @ log.poses[row])[1]
-        distance = float(np.linalg.norm(marker.translation() - points[row]))
-        held.append(HeldRow(row, X, distance, angle))
-    return held
+        held.append((np.linalg.norm(marker.translation() - points[row]), angle))
+    return np.array(held)
 
 
 def _tracked_points(setup: Setup, result: CalibrationResult) -> Array:

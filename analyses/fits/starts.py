@@ -19,7 +19,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.fits.poses import on_motion
 from cdpr_drake.analyses.fits.setup import Setup, StartPoint
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares
+from cdpr_drake.calibration.elimination import MOST_STEPS
+from cdpr_drake.calibration.fit_groups import GroupFault, group_faults
 from cdpr_drake.calibration.pose_search import (
     HUBER,
     FoundPoses,
@@ -95,7 +96,7 @@ class BestFit:
         result: Its result.
         ties: Poses of other minima that fit as well, by rows.
         minima: Number of minima in which starts ended.
-        problem: The problem that was solved for it.
+        groups: Groups of measurements that do not agree with the others.
         flipped_costs_less: By how much the best minimum with the platform upside down costs less
             than this one [-]; 0 if none does.
     """
@@ -103,7 +104,7 @@ class BestFit:
     result: CalibrationResult
     ties: tuple[Tie, ...]
     minima: int
-    problem: LeastSquares
+    groups: tuple[GroupFault, ...]
     flipped_costs_less: float = 0.0
 
 
@@ -156,7 +157,8 @@ def best_of_starts(setup: Setup, say: Callable[[str], None], others: bool = True
     ties.sort(key=lambda tie: (tie.pose, tie.more))
     less = max(0.0, best.cost - min(minimum.cost for minimum in minima))
     problem = best.program.SolvedProblem(best.result, setup.task.outliers)
-    return BestFit(best.result, tuple(ties), len(minima), problem, less)
+    groups = group_faults(problem, best.result)
+    return BestFit(best.result, tuple(ties), len(minima), groups, less)
 
 
 def _from_one_pose(setup: Setup, start: StartPoint) -> Minimum | None:

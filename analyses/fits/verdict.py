@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -83,19 +83,7 @@ SIGNED = {
 TILTS = ("roll", "pitch", "yaw")
 
 
-class Refit(NamedTuple):
-    """A fit to a log that was changed: its result, and groups of measurements that disagree."""
-
-    result: CalibrationResult
-    groups: tuple[GroupFault, ...]
-
-    @property
-    def fits(self) -> bool:
-        """True if it fits the measurements."""
-        return not misfits(self.result, self.groups)
-
-
-Refitted = Callable[[CalibrationTask], Refit]
+Refitted = Callable[[CalibrationTask], BestFit]
 """Calibrates anew, from one start."""
 
 
@@ -229,20 +217,11 @@ def with_enlarged_deviations(
     return replace(result, pose_std=by_row[:, None] * result.pose_std), tuple(remarks)
 
 
-def doubts(
-    setup: Setup, best: BestFit, groups: Sequence[GroupFault], enlarged: Sequence[str] = ()
-) -> list[str]:
-    """What should be known of a fit, in words.
-
-    Args:
-        setup: The problem.
-        best: Its fit.
-        groups: Groups of measurements that do not agree.
-        enlarged: Remarks on deviations that were enlarged for these.
-    """
+def doubts(setup: Setup, best: BestFit, enlarged: Sequence[str]) -> list[str]:
+    """What should be known of a fit, in words; with remarks on deviations that were enlarged."""
     result = best.result
     remarks = [*setup.task.log.remarks, *unused_columns(setup)]
-    for group in groups:
+    for group in best.groups:
         if not group.counts:
             moves = f"; poses would move by {group.moves:.2g} of their deviations without that"
             remarks.append(group.words + (moves if np.isfinite(group.moves) else ""))
@@ -350,10 +329,7 @@ def _tied(ties: tuple[Tie, ...]) -> str:
     )
 
 
-def turned_sensors(
-    task: CalibrationTask, result: CalibrationResult, groups: Sequence[GroupFault],
-    refitted: Refitted,
-) -> tuple[str, ...]:  # fmt: skip
+def turned_sensors(task: CalibrationTask, best: BestFit, refitted: Refitted) -> tuple[str, ...]:
     """What would fit otherwise, in words: sensors of which much was thrown out, tried anew.
 
     Single sensors come first: with the sign turned, or two of them exchanged. Then come kinds of
@@ -364,10 +340,10 @@ def turned_sensors(
 
     Args:
         task: The task.
-        result: Its result, which is no fit.
-        groups: Groups of measurements that do not agree.
+        best: Its best fit, which is none.
         refitted: Calibrates anew.
     """
+    result, groups = best.result, best.groups
     gone = [group for group in groups if group.test == "dropped"]
     most = max((group.size for group in gone), default=0.0)
     lost = [g.quantity.removeprefix("readings of ") for g in gone if 2.0 * g.size >= most]
@@ -406,7 +382,7 @@ def turned_where_lost(task: CalibrationTask, refitted: Refitted) -> tuple[str, .
         except CalibrationError:
             continue
         fit = again.result.residuals.get(kind)
-        if fit is not None and again.fits:
+        if fit is not None and not misfits(again.result, again.groups):
             return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
     return _first_that_fits(_turned_cables(task, list(SIGNED)), refitted)
 
@@ -424,10 +400,11 @@ def _first_that_fits(
     """The words of the first trial that fits as a whole."""
     for words, trial in trials:
         try:
-            if refitted(trial).fits:
-                return (f"all fits with {words}",)
+            again = refitted(trial)
         except CalibrationError:
             continue
+        if not misfits(again.result, again.groups):
+            return (f"all fits with {words}",)
     return ()
 
 
