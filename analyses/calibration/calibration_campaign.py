@@ -20,7 +20,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model,
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas, TagPlace
 from cdpr_drake.analyses.calibration.calibration_task import Calibration, calibrate
 from cdpr_drake.analyses.calibration.candidate_poses import in_short_hops, rest_poses
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
@@ -172,7 +172,7 @@ def run_campaign(
         true, rested, targets, pinhole, scenario.camera.pixel_noise or 0.1, random
     )
     t = np.array(tensions)
-    log = CalibrationLog(
+    log = Measurements(
         Path(f"campaign of {scenario.name}"), len(rested), lengths=np.array(counted) + noise,
         tensions=np.maximum(t + SIGMAS.tensions * random.standard_normal(t.shape), 0.0),
         corners={tag: uv[:, k] for k, tag in enumerate(targets)},

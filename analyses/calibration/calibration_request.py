@@ -9,9 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model, find_mount
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.log_fit import wound_lengths
-from cdpr_drake.analyses.calibration.motion_start import off_plane, on_motion
+from cdpr_drake.analyses.logs.measurements import Measurements, off_plane, on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measured_program import first_readings
@@ -147,7 +145,7 @@ class Prepared:
     """
 
     task: CalibrationTask
-    log: CalibrationLog
+    log: Measurements
     model: CalibrationModel
     lengths: Array | None
     sigma: Array | None
@@ -178,14 +176,14 @@ class Prepared:
         return [name for name in self.unknown if not name.startswith("tag")]
 
 
-def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
+def prepare(task: CalibrationTask, log: Measurements) -> Prepared:
     """Checks a log and a task.
 
     Raises:
         CalibrationError: The log does not hold what is asked; names it.
     """
     robot, sigmas = task.robot, task.sigmas
-    lengths = wound_lengths(robot, log)
+    lengths = log.wound(robot)
     if lengths is None and log.swivels is None:
         raise CalibrationError(
             f"{log.path}: cable lengths: found none; accepted: columns such as C1_length_m, or "
@@ -222,16 +220,14 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
     unknown += [f"tag{tag}.*" for tag in places if tag not in sure and "tags" not in unknown]
     if log.swivels is not None and "swivel_offsets" not in unknown:
         unknown.append("swivel_offsets")
-    points = _points_of(task, log)
+    points = log.positions(robot)
     is_point = robot.motion_type().is_point
     blind = log.poses is None and not targets and not (points is not None and is_point)
     rest = task.rest
     if rest is None:
         rest = blind and (log.tensions is not None or log.swivels is not None)
     first = on_motion(robot, task.start or robot.home.transform())
-    tracked = None if log.poses is None else list(log.poses)
-    if points is not None and is_point:
-        tracked = [_at_point(robot, p) for p in points]
+    tracked = log.platform_poses(robot)
     made = Prepared(
         task, log, with_tags(model, known), lengths, None, first, rest, mount, pinhole, targets,
         tuple(unknown), priors, tracked, points,
@@ -265,13 +261,13 @@ def turns_unknown(prepared: Prepared) -> bool:
     return bool((free & ~known)[begin : begin + 3].all())
 
 
-def is_homing(robot: Robot, log: CalibrationLog) -> bool:
+def is_homing(robot: Robot, log: Measurements) -> bool:
     """Whether a robot with fewer cables than degrees of freedom has nothing but its own sensors."""
     seen = log.poses is not None or log.points is not None or bool(log.corners)
     return robot.is_underactuated() and not seen
 
 
-def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
+def default_unknown(robot: Robot, log: Measurements) -> tuple[str, ...]:
     """What is looked for where nothing is said.
 
     A robot with fewer cables than degrees of freedom, whose own sensors are all there is, first has
@@ -294,34 +290,7 @@ def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
     return tuple(f"*.{point}.[{inside}]" for point in points)
 
 
-def _points_of(task: CalibrationTask, log: CalibrationLog) -> Array | None:
-    """Positions of a tracker without rotations; in a plane those across it may be missing.
-
-    Raises:
-        CalibrationError: A coordinate is missing that the platform moves along.
-    """
-    if log.points is None:
-        return None
-    points, normal = log.points.copy(), off_plane(task.robot)
-    for axis in np.flatnonzero(~np.isfinite(points).any(axis=0)):
-        if normal is None or abs(normal[axis]) < 1.0:
-            raise CalibrationError(
-                f"{log.path}: position: found no {'xyz'[axis]}; accepted: x_m, y_m and z_m, or "
-                "those in which the platform moves"
-            )
-        seen = np.isfinite(np.delete(points, axis, axis=1)).all(axis=1)
-        points[seen, axis] = task.robot.home.position[axis]
-    return points
-
-
-def _at_point(robot: Robot, p_WP: Array) -> RigidTransform | None:
-    """A position of a point mass as its pose, where there is one."""
-    if not np.isfinite(p_WP).all():
-        return None
-    return on_motion(robot, RigidTransform(robot.home.transform().rotation(), p_WP))
-
-
-def _check_images(log: CalibrationLog, width: int, height: int) -> None:
+def _check_images(log: Measurements, width: int, height: int) -> None:
     for tag, uv in log.corners.items():
         outside = (
             (uv[..., 0] > width - 0.5) | (uv[..., 1] > height - 0.5) | np.any(uv < -0.5, axis=-1)

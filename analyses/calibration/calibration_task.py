@@ -31,7 +31,6 @@ from cdpr_drake.analyses.calibration.held_out import (
     held_groups,
     predicted,
 )
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.tracker import (
     check_clock,
     with_tracker,
@@ -44,6 +43,7 @@ from cdpr_drake.analyses.calibration.turned_sensors import (
     turned_sensors,
     turned_where_lost,
 )
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.fit_groups import GroupFault, group_faults
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
@@ -69,7 +69,7 @@ class Calibration:
     """
 
     task: CalibrationTask
-    log: CalibrationLog
+    log: Measurements
     result: CalibrationResult
     mount: str | None
     remarks: tuple[str, ...]
@@ -80,7 +80,7 @@ class Calibration:
 
 
 def calibrate(
-    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None] = lambda words: None
+    task: CalibrationTask, log: Measurements, say: Callable[[str], None] = lambda words: None
 ) -> Calibration:
     """Calibrates a robot.
 
@@ -148,14 +148,14 @@ def _quiet(words: str) -> None:
     """Says nothing."""
 
 
-def _refitted(task: CalibrationTask, log: CalibrationLog) -> Refit:
+def _refitted(task: CalibrationTask, log: Measurements) -> Refit:
     """What one start finds, to try what may be wrong of a log; and groups that do not agree."""
     found = _fitted(task, log, _quiet, others=False)[1]
     return Refit(found.result, group_faults(found.problem, found.result))
 
 
 def _fitted(
-    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None], others: bool = True
+    task: CalibrationTask, log: Measurements, say: Callable[[str], None], others: bool = True
 ) -> tuple[Prepared, MultiStartFit]:
     """The log and task, checked, and the best of all starts, or of the believed one alone."""
     say("Looking for where the poses were")
@@ -169,7 +169,7 @@ def _fitted(
 
 
 def _held_out(
-    task: CalibrationTask, log: CalibrationLog, say: Callable[[str], None]
+    task: CalibrationTask, log: Measurements, say: Callable[[str], None]
 ) -> Calibration:
     """A calibration on some rows, the others predicted; or on all, each held out once."""
     assert task.hold_out is not None

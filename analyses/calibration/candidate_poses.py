@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.motion_start import on_motion
+from cdpr_drake.analyses.logs.measurements import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, CdprError
 from cdpr_drake.geometry.poses import place_error, pose_from_angles

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
-from cdpr_drake.analyses.calibration.motion_start import off_plane
+from cdpr_drake.analyses.logs.measurements import off_plane
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
 from cdpr_drake.calibration.measured_program import first_readings

@@ -22,8 +22,8 @@ from cdpr_drake.analyses.calibration.fit_programs import (
     program_from,
     start_points,
 )
-from cdpr_drake.analyses.calibration.motion_start import on_motion
 from cdpr_drake.analyses.calibration.turned_sensors import upside_down
+from cdpr_drake.analyses.logs.measurements import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import MOST_STEPS, LeastSquares
 from cdpr_drake.calibration.pose_search import (

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
-from cdpr_drake.analyses.calibration.columns import (
+from cdpr_drake.analyses.logs.columns import (
     ANGLES,
     QUATERNION,
     RPY,

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.fit_programs import add_winches, guessed_tensions
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.point_terms import Course
 from cdpr_drake.calibration.pose_search import robust_poses
@@ -85,7 +85,7 @@ class HeldOut:
         )
 
 
-def held_groups(words: str | int, log: CalibrationLog, zeroed: bool) -> list[npt.NDArray[np.intp]]:
+def held_groups(words: str | int, log: Measurements, zeroed: bool) -> list[npt.NDArray[np.intp]]:
     """Which rows are held out, from 0, one group for each fit.
 
     Args:
@@ -127,7 +127,7 @@ def held_groups(words: str | int, log: CalibrationLog, zeroed: bool) -> list[npt
     return [rows]
 
 
-def tracked_rows(log: CalibrationLog) -> npt.NDArray[np.intp]:
+def tracked_rows(log: Measurements) -> npt.NDArray[np.intp]:
     """Rows in which a tracker told a pose or a position, from 0."""
     if log.points is not None:
         return np.flatnonzero(np.isfinite(log.points).all(axis=1))

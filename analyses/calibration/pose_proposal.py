@@ -15,7 +15,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot
 from cdpr_drake.analyses.calibration.calibration_request import Prepared, prepare
 from cdpr_drake.analyses.calibration.calibration_task import Calibration
 from cdpr_drake.analyses.calibration.candidate_poses import in_short_hops, rest_poses
-from cdpr_drake.analyses.calibration.motion_start import off_plane
+from cdpr_drake.analyses.logs.measurements import off_plane
 from cdpr_drake.analyses.reporting.log_files import finite, write_whole
 from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.arrays import Array

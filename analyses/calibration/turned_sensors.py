@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
 from cdpr_drake.analyses.calibration.fit_verdict import is_thrown_out, misfits
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult
@@ -51,12 +51,12 @@ class Refit(NamedTuple):
         return not misfits(self.result, self.groups)
 
 
-Refitted = Callable[[CalibrationTask, CalibrationLog], Refit]
+Refitted = Callable[[CalibrationTask, Measurements], Refit]
 
 
 def turned_sensors(
     task: CalibrationTask,
-    log: CalibrationLog,
+    log: Measurements,
     result: CalibrationResult,
     groups: Sequence[GroupFault],
     refitted: Refitted,
@@ -117,7 +117,7 @@ def _is_clear(group: GroupFault) -> bool:
 
 
 def turned_where_lost(
-    task: CalibrationTask, log: CalibrationLog, refitted: Refitted
+    task: CalibrationTask, log: Measurements, refitted: Refitted
 ) -> tuple[str, ...]:
     """As `turned_sensors`, where no start leads anywhere.
 
@@ -140,7 +140,7 @@ def turned_where_lost(
     return _first_that_fits(task, _turned_cables(task, log, list(TRIED)), refitted)
 
 
-Trial = tuple[str, CalibrationLog]
+Trial = tuple[str, Measurements]
 """What fits with it, in words, and a log that was changed."""
 
 
@@ -159,7 +159,7 @@ def _first_that_fits(
 
 
 def _single_sensors(
-    task: CalibrationTask, log: CalibrationLog, lost: Sequence[str]
+    task: CalibrationTask, log: Measurements, lost: Sequence[str]
 ) -> Iterator[Trial]:
     """Sensors by their names in words, as "roll" or "length of C1": turned, two exchanged."""
     columns: dict[str, tuple[str, str, int]] = {}
@@ -189,14 +189,14 @@ MOST_SUSPECTS = 3
 """Sensors that are tried one by one, and exchanged in pairs."""
 
 
-def _with_column(log: CalibrationLog, field: str, k: int, factor: float) -> CalibrationLog:
+def _with_column(log: Measurements, field: str, k: int, factor: float) -> Measurements:
     """A log with one column of a field times a factor."""
     values = getattr(log, field).copy()
     values[:, k] *= factor
     return replace(log, **{field: values})
 
 
-def _turned_cables(task: CalibrationTask, log: CalibrationLog, kinds: list[str]) -> Iterator[Trial]:
+def _turned_cables(task: CalibrationTask, log: Measurements, kinds: list[str]) -> Iterator[Trial]:
     """Each cable's sensor of some kinds with its sign turned."""
     for kind in kinds:
         field = TRIED.get(kind, "")

@@ -28,14 +28,13 @@ from cdpr_drake.analyses.calibration.identification_task import (
     IdentificationTask,
 )
 from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.calibration.pose_proposal import next_poses
 from cdpr_drake.analyses.calibration.tag_file import read_tags
-from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -98,7 +97,7 @@ class RobotIdentification(FittedRobot, Identification):
 @verb()
 def calibrate(
     robot: Robot | str | Path,
-    log: CalibrationLog | Path | str,
+    log: Measurements | Path | str,
     unknown: str | Sequence[str] | None = None,
     *,
     sigmas: Sigmas | Mapping[str, float] | None = None,
@@ -198,11 +197,11 @@ def proposed_poses(
 
 def _inputs(
     robot: Robot,
-    log: CalibrationLog | Path | str,
+    log: Measurements | Path | str,
     tags: Mapping[int, TagPlace] | Path | str | None,
     tag_size: float | None,
     tracker_late: float | None,
-) -> tuple[CalibrationLog, dict[int, TagPlace]]:
+) -> tuple[Measurements, dict[int, TagPlace]]:
     """The log and what is known of tags; arguments, and what is raised, as of `calibrate`."""
     if tags is not None and tag_size is not None:
         raise CalibrationError("tag_size: found beside tags; accepted: one of them")
@@ -219,10 +218,10 @@ def _inputs(
 @verb()
 def identify(
     robot: Robot | str | Path,
-    log: CalibrationLog | Path | str,
+    log: Measurements | Path | str,
     unknown: str | Sequence[str] = UNKNOWN,
     *,
-    validate: CalibrationLog | Path | str | None = None,
+    validate: Measurements | Path | str | None = None,
     tracker_late: float | None = None,
     folder: Path | str | None = None,
     overwrite: bool = False,
@@ -271,10 +270,10 @@ def identify(
     return kept_fit(keeping, session or Session(say=say), f"Identifying {loaded.name}", work)
 
 
-def _read(robot: Robot, log: CalibrationLog | Path | str, late: float | None) -> CalibrationLog:
+def _read(robot: Robot, log: Measurements | Path | str, late: float | None) -> Measurements:
     if isinstance(log, str | Path):
-        log = read_log(Path(log), [cable.name for cable in robot.cables])
-    return log if late is None else shifted_log(log, late)
+        log = read_measurements(Path(log), [cable.name for cable in robot.cables])
+    return log if late is None else log.shifted(late)
 
 
 def _words(names: str | Sequence[str]) -> tuple[str, ...]:

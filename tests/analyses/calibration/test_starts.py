@@ -12,7 +12,7 @@ from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
 from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
 from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -55,7 +55,7 @@ def planar_log(bad, sigma=2e-4, outliers=True):
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     readings = lengths + 2e-4 * random.standard_normal(lengths.shape)
     readings[8, 1] += bad
-    log = CalibrationLog(Path("plane"), 14, lengths=readings - readings[0])
+    log = Measurements(Path("plane"), 14, lengths=readings - readings[0])
     task = CalibrationTask(
         robot, ("length_offsets",), sigmas=Sigmas(lengths=sigma), start=poses[0], outliers=outliers
     )
@@ -123,7 +123,7 @@ def test_an_inclinometer_holds_what_lengths_leave_open():
     poses = logs.poses(6)
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    log = CalibrationLog(
+    log = Measurements(
         Path("tilted"), 6, lengths=lengths, tilts=tilts, torques=np.zeros((6, 4)),
         headers={"rpy": ("roll_rad",), "motor torques": ("C1_torque_nm", "C2_torque_nm")},
     )  # fmt: skip
