@@ -11,15 +11,14 @@ from .analyses.fits.fit import Fit as Fit
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import identify as identify
 from .analyses.front.free_motion import identify_free_motion as identify_free_motion
-from .analyses.front.logs import import_log as import_log
-from .analyses.front.logs import replay_log as replay_log
 from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.front.session import Session as Session
 from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics
-from .analyses.logs.log_request import LogRequest as LogRequest
+from .analyses.logs.import_log import import_log as import_log
+from .analyses.logs.replay import replay_log as replay_log
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion

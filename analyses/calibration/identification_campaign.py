@@ -26,7 +26,7 @@ from cdpr_drake.analyses.calibration.identified_robots import (
     identified_robot,
     platform_size,
 )
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.runs.log import Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
@@ -302,12 +302,12 @@ def recorded(log: Log, random: np.random.Generator) -> dict[str, Array]:
     }
 
 
-def as_read(path: Path, log: Log) -> CalibrationLog:
+def as_read(path: Path, log: Log) -> Measurements:
     """A recorded log as `read_log` gives it from a file."""
     count = len(log["time"])
     if count < 2:
         raise IdentificationError(f"{path}: found {count} rows; accepted: a motion")
-    return CalibrationLog(
+    return Measurements(
         path, count, np.asarray(log["time"]), lengths=np.asarray(log["measured_lengths"]),
         tensions=np.asarray(log["measured_tensions"]),
         poses=[pose_from_row(row) for row in log["X_WP"]],

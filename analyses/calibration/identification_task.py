@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker, wound_lengths
+from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.errors import IdentificationError
@@ -89,7 +89,7 @@ class Validation:
         misfit: Root mean square of what is not explained by either, by quantity with its unit.
     """
 
-    log: CalibrationLog
+    log: Measurements
     samples: LoggedMotion
     predicted: Array
     misfit: dict[str, dict[str, float]]
@@ -118,8 +118,8 @@ class Identification:
 
 def identify(
     task: IdentificationTask,
-    log: CalibrationLog,
-    validate: CalibrationLog | None = None,
+    log: Measurements,
+    validate: Measurements | None = None,
     say: Callable[[str], None] = lambda words: None,
 ) -> Identification:
     """Identifies a robot.
@@ -192,19 +192,19 @@ def _misfit_words(found: IdentificationResult) -> str:
     )
 
 
-def _usual_bandwidth(log: CalibrationLog) -> float:
+def _usual_bandwidth(log: Measurements) -> float:
     time = _time(log)
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     return min(USUAL_BANDWIDTH, 0.2 / step)
 
 
-def _time(log: CalibrationLog) -> Array:
+def _time(log: Measurements) -> Array:
     if log.time is None:
         raise IdentificationError(f"{log.path}: time: found none; accepted: a column time_s")
     return log.time
 
 
-def _pose_rows(log: CalibrationLog) -> Array:
+def _pose_rows(log: Measurements) -> Array:
     if log.poses is None:
         lacking = "none" if log.points is None else "x, y, z without a rotation"
         raise IdentificationError(
@@ -215,7 +215,7 @@ def _pose_rows(log: CalibrationLog) -> Array:
     return np.array([nothing if X is None else pose_row(X) for X in log.poses])
 
 
-def _samples(task: IdentificationTask, log: CalibrationLog, bandwidth: float) -> LoggedMotion:
+def _samples(task: IdentificationTask, log: Measurements, bandwidth: float) -> LoggedMotion:
     """A log's motion, smoothed."""
     time, rows = _time(log), _pose_rows(log)
     if log.tensions is None:
@@ -235,9 +235,9 @@ def _samples(task: IdentificationTask, log: CalibrationLog, bandwidth: float) ->
         raise IdentificationError(f"{log.path}: {problem}") from problem
 
 
-def _counted(task: IdentificationTask, log: CalibrationLog) -> Array:
+def _counted(task: IdentificationTask, log: Measurements) -> Array:
     """Unstrained lengths as the winches count them, shape (k, m) [m]."""
-    lengths = wound_lengths(task.robot, log)
+    lengths = log.wound(task.robot)
     if lengths is None:
         raise IdentificationError(
             f"{log.path}: cable lengths: found none; accepted: what winches count, in columns such "
@@ -249,7 +249,7 @@ def _counted(task: IdentificationTask, log: CalibrationLog) -> Array:
 def _measure(
     program: IdentificationProgram,
     task: IdentificationTask,
-    log: CalibrationLog,
+    log: Measurements,
     samples: LoggedMotion,
     bandwidth: float,
 ) -> None:
@@ -285,7 +285,7 @@ def _measure(
 def _compared(
     program: IdentificationProgram,
     task: IdentificationTask,
-    log: CalibrationLog,
+    log: Measurements,
     samples: LoggedMotion,
     found: IdentificationResult,
     bandwidth: float,
@@ -322,7 +322,7 @@ def _check_strain(found: IdentificationResult) -> None:
         )
 
 
-def _check_clock(task: IdentificationTask, log: CalibrationLog, samples: LoggedMotion) -> None:
+def _check_clock(task: IdentificationTask, log: Measurements, samples: LoggedMotion) -> None:
     """Refuses poses that are out of sync with lengths or tensions.
 
     Raises:

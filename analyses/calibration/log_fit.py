@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 from pydrake.common.yaml import yaml_dump_typed
 from rich.table import Table
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
-from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.identification.result import IdentificationResult
@@ -68,16 +67,8 @@ def fitted_robot(
     return replace(robot, **changes, assumptions=f"{robot.assumptions} {words}".strip())
 
 
-def wound_lengths(robot: Robot, log: CalibrationLog) -> Array | None:
-    """Unstrained lengths as the winches count them, or as their motors' angles say, shape (k, m)
-    [m]; None: the log has neither."""
-    if log.lengths is None and log.angles is not None:
-        return robot.drum().paid_out(log.angles)
-    return log.lengths
-
-
 def refuse_late_tracker(
-    log: CalibrationLog, against: str, found: tuple[float, float], step: float,
+    log: Measurements, against: str, found: tuple[float, float], step: float,
     error: type[CalibrationError] | type[IdentificationError],
 ) -> None:  # fmt: skip
     """Refuses a tracker that is out of sync.

@@ -11,9 +11,6 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.tag_file import TagPlace, read_tags
-from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot
 from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, kept_fit, notes_table
 from cdpr_drake.analyses.fits.prediction import (
@@ -35,6 +32,7 @@ from cdpr_drake.analyses.fits.setup import (
     with_tracker,
 )
 from cdpr_drake.analyses.fits.starts import BestFit, Tie, best_of_starts
+from cdpr_drake.analyses.fits.tags import TagPlace, read_tags
 from cdpr_drake.analyses.fits.verdict import (
     doubts,
     impossible_poses,
@@ -61,6 +59,7 @@ from cdpr_drake.analyses.frame.words import (
     whole_pair,
     words,
 )
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
@@ -204,9 +203,9 @@ def calibrate(
     """
     loaded = as_robot(robot, "calibrate")
     if isinstance(log, str | Path):
-        log = read_log(Path(log), [cable.name for cable in loaded.cables])
+        log = read_measurements(log, [cable.name for cable in loaded.cables])
     if tracker_late is not None:
-        log = shifted_log(log, tracker_late)
+        log = log.shifted(tracker_late)
     default = unknown is None
     names = default_unknown(loaded, log) if unknown is None else _names(unknown)
     sigmas = dict(sigmas or {})

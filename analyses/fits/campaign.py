@@ -19,8 +19,6 @@ from cyclopts import Parameter
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.tag_file import TagPlace
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model, find_mount
 from cdpr_drake.analyses.fits.calibration import (
     Calibration,
@@ -32,6 +30,7 @@ from cdpr_drake.analyses.fits.calibration import (
 from cdpr_drake.analyses.fits.fit import ROBOT, Fit, kept_fit
 from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
+from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -44,6 +43,7 @@ from cdpr_drake.analyses.frame.words import (
     Switch,
     whole,
 )
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.runs.servo import ServoRun
@@ -205,7 +205,7 @@ class Record:
         remarks: Sentences on poses that told nothing.
     """
 
-    log: CalibrationLog
+    log: Measurements
     poses: list[RigidTransform]
     goals: list[RigidTransform]
     first: Array
@@ -252,7 +252,7 @@ def record(scene: Scene, goals: Sequence[RigidTransform]) -> Record:
     noise = SIGMAS.lengths * random.standard_normal((len(rested), true.cables.count))
     uv = simulated_corners(true, rested, scene.targets, scene.pinhole, scene.corner_sigma, random)
     t = np.array(tensions)
-    log = CalibrationLog(
+    log = Measurements(
         Path(f"campaign of {scene.scenario.name}"), len(rested), lengths=np.array(counted) + noise,
         tensions=np.maximum(t + SIGMAS.tensions * random.standard_normal(t.shape), 0.0),
         corners={tag: uv[:, k] for k, tag in enumerate(scene.targets)},

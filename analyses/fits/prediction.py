@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot
-from cdpr_drake.analyses.fits.poses import in_short_hops, plane_normal, rest_poses
+from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses
 from cdpr_drake.analyses.fits.setup import Setup, prepare
 from cdpr_drake.analyses.frame.result import Table
+from cdpr_drake.analyses.logs.measurements import Measurements, off_plane
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.measured_program import first_readings
@@ -90,7 +90,7 @@ class HeldOut:
         )
 
 
-def held_groups(words: str | int, log: CalibrationLog, zeroed: bool) -> list[npt.NDArray[np.intp]]:
+def held_groups(words: str | int, log: Measurements, zeroed: bool) -> list[npt.NDArray[np.intp]]:
     """Rows that are held out, from 0, a group for each fit.
 
     Args:
@@ -132,7 +132,7 @@ def held_groups(words: str | int, log: CalibrationLog, zeroed: bool) -> list[npt
     return [rows]
 
 
-def tracked_rows(log: CalibrationLog) -> npt.NDArray[np.intp]:
+def tracked_rows(log: Measurements) -> npt.NDArray[np.intp]:
     """Rows in which a tracker saw a pose or a position, from 0."""
     if log.points is not None:
         return np.flatnonzero(np.isfinite(log.points).all(axis=1))
@@ -304,7 +304,7 @@ def _expected(
     if setup.points is not None:
         program.AddTrackedPoints(
             np.array([X.translation() for X in seen]), sigmas.place,
-            normal=plane_normal(robot), sigma_along=sigmas.off_plane,
+            normal=off_plane(robot), sigma_along=sigmas.off_plane,
         )  # fmt: skip
     if setup.targets:
         assert setup.pinhole is not None

@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker, wound_lengths
-from cdpr_drake.analyses.calibration.tag_file import TagPlace
+from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model, find_mount
-from cdpr_drake.analyses.fits.poses import on_motion, plane_normal
+from cdpr_drake.analyses.fits.tags import TagPlace
+from cdpr_drake.analyses.logs.measurements import Measurements, off_plane, on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, guessed_tracker, poses_by_tags, with_tags
 from cdpr_drake.calibration.measured_program import first_readings
@@ -101,7 +100,7 @@ class CalibrationTask:
     """
 
     robot: Robot
-    log: CalibrationLog
+    log: Measurements
     unknown: tuple[str, ...]
     priors: dict[str, float] = field(default_factory=dict)
     bounds: dict[str, float] = field(default_factory=dict)
@@ -214,7 +213,7 @@ class Setup:
         if self.points is not None:
             clock = program.free[program.layout.slices["clock"]].any()
             program.AddTrackedPoints(
-                self.points, sigmas.place, normal=plane_normal(task.robot),
+                self.points, sigmas.place, normal=off_plane(task.robot),
                 sigma_along=sigmas.off_plane, times=log.time if clock else None,
             )  # fmt: skip
         if self.targets:
@@ -346,7 +345,7 @@ def prepare(task: CalibrationTask) -> Setup:
         CalibrationError: The log does not hold what the task needs; names it.
     """
     robot, log, sigmas = task.robot, task.log, task.sigmas
-    lengths = wound_lengths(robot, log)
+    lengths = log.wound(robot)
     if lengths is None and log.swivels is None:
         raise CalibrationError(
             f"{log.path}: cable lengths: found none; accepted: columns such as C1_length_m, or "
@@ -365,10 +364,7 @@ def prepare(task: CalibrationTask) -> Setup:
             unknown.append(f"tag{tag}.*")
     if log.swivels is not None and "swivel_offsets" not in unknown:
         unknown.append("swivel_offsets")
-    points = _positions(robot, log)
-    tracked = None if log.poses is None else list(log.poses)
-    if points is not None and robot.motion_type().is_point:
-        tracked = [_point_pose(robot, p) for p in points]
+    points, tracked = log.positions(robot), log.platform_poses(robot)
     setup = Setup(
         task, with_tags(calibration_model(robot, mount), known), tuple(unknown), priors,
         first=on_motion(robot, task.start or robot.home.transform()), rest=False, lengths=lengths,
@@ -410,29 +406,6 @@ def _camera(task: CalibrationTask, mount: str) -> Pinhole:
             "accepted: tag_size, or a row for each"
         )
     return camera.pinhole(width, height)
-
-
-def _positions(robot: Robot, log: CalibrationLog) -> Array | None:
-    """Positions of a tracker without rotations; in a plane those across it may be missing."""
-    if log.points is None:
-        return None
-    points, normal = log.points.copy(), plane_normal(robot)
-    for axis in np.flatnonzero(~np.isfinite(points).any(axis=0)):
-        if normal is None or abs(normal[axis]) < 1.0:
-            raise CalibrationError(
-                f"{log.path}: position: found no {'xyz'[axis]}; accepted: x_m, y_m and z_m, or "
-                "those in which the platform moves"
-            )
-        rows = np.isfinite(np.delete(points, axis, axis=1)).all(axis=1)
-        points[rows, axis] = robot.home.position[axis]
-    return points
-
-
-def _point_pose(robot: Robot, p_WP: Array) -> RigidTransform | None:
-    """A position of a point mass as its pose, if there is one."""
-    if not np.isfinite(p_WP).all():
-        return None
-    return on_motion(robot, RigidTransform(robot.home.transform().rotation(), p_WP))
 
 
 def with_tracker(setup: Setup) -> Setup:
@@ -499,13 +472,13 @@ def _check_clock(setup: Setup) -> None:
     refuse_late_tracker(log, "cable lengths", shift, step, CalibrationError)
 
 
-def is_homing(robot: Robot, log: CalibrationLog) -> bool:
+def is_homing(robot: Robot, log: Measurements) -> bool:
     """True if a robot with fewer cables than degrees of freedom has only its own sensors."""
     seen = log.poses is not None or log.points is not None or bool(log.corners)
     return robot.is_underactuated() and not seen
 
 
-def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
+def default_unknown(robot: Robot, log: Measurements) -> tuple[str, ...]:
     """Groups and names of parameters that are unknown by default.
 
     A robot with fewer cables than degrees of freedom and only its own sensors first has to know
@@ -513,7 +486,7 @@ def default_unknown(robot: Robot, log: CalibrationLog) -> tuple[str, ...]:
     anchor points from exit points; other robots look for both. In a plane across an axis of W, but
     for a body's horizontal one, coordinates across it are left out.
     """
-    motion, normal = robot.motion_type(), plane_normal(robot)
+    motion, normal = robot.motion_type(), off_plane(robot)
     if is_homing(robot, log):
         yaw = log.tilts is not None and bool(np.isfinite(log.tilts[:, 2]).any())
         lengths = log.lengths is not None or log.angles is not None

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.fits.poses import on_motion
 from cdpr_drake.analyses.fits.setup import Setup, StartPoint
+from cdpr_drake.analyses.logs.measurements import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import MOST_STEPS
 from cdpr_drake.calibration.fit_groups import GroupFault, group_faults

@@ -12,7 +12,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from cdpr_drake.analyses.calibration.columns import (
+from cdpr_drake.analyses.fits.fit import MISFIT_FACTOR
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Setup
+from cdpr_drake.analyses.fits.starts import BestFit, Tie, upside_down
+from cdpr_drake.analyses.logs.columns import (
     ANGLES,
     QUATERNION,
     RPY,
@@ -22,9 +25,6 @@ from cdpr_drake.analyses.calibration.columns import (
     TORQUES,
     TURN,
 )
-from cdpr_drake.analyses.fits.fit import MISFIT_FACTOR
-from cdpr_drake.analyses.fits.setup import CalibrationTask, Setup
-from cdpr_drake.analyses.fits.starts import BestFit, Tie, upside_down
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult, Fit

@@ -16,12 +16,11 @@ from cdpr_drake.analyses.calibration.identification_task import (
     IdentificationTask,
 )
 from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
-from cdpr_drake.analyses.calibration.tracker import shifted_log
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -55,10 +54,10 @@ class RobotIdentification(FittedRobot, Identification):
 @verb()
 def identify(
     robot: Robot | str | Path,
-    log: CalibrationLog | Path | str,
+    log: Measurements | Path | str,
     unknown: str | Sequence[str] = UNKNOWN,
     *,
-    validate: CalibrationLog | Path | str | None = None,
+    validate: Measurements | Path | str | None = None,
     tracker_late: float | None = None,
     folder: Path | str | None = None,
     overwrite: bool = False,
@@ -107,10 +106,10 @@ def identify(
     return kept_fit(keeping, session or Session(say=say), f"Identifying {loaded.name}", work)
 
 
-def _read(robot: Robot, log: CalibrationLog | Path | str, late: float | None) -> CalibrationLog:
+def _read(robot: Robot, log: Measurements | Path | str, late: float | None) -> Measurements:
     if isinstance(log, str | Path):
-        log = read_log(Path(log), [cable.name for cable in robot.cables])
-    return log if late is None else shifted_log(log, late)
+        log = read_measurements(Path(log), [cable.name for cable in robot.cables])
+    return log if late is None else log.shifted(late)
 
 
 def _words(names: str | Sequence[str]) -> tuple[str, ...]:

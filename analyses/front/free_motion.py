@@ -16,11 +16,11 @@ from cdpr_drake.analyses.calibration.free_motion import (
     fit_free_motion,
 )
 from cdpr_drake.analyses.calibration.free_motion_report import free_motion_fit
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.front.fitted_robots import FittedRobot, Keeping, kept_fit
 from cdpr_drake.analyses.front.session import Say, Session
+from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -66,7 +66,7 @@ KEPT = ("folder", "overwrite", "formats", "say", "session")
 @verb()
 def identify_free_motion(
     robot: Robot | str | Path,
-    log: CalibrationLog | Path | str,
+    log: Measurements | Path | str,
     unknown: str | Sequence[str] | None = None,
     *,
     stretches: Spans = (),
@@ -110,7 +110,7 @@ def identify_free_motion(
         if name not in KEPT:
             raise IdentificationError(f"{name!r} is unknown; {closest(name, KEPT)}")
     if isinstance(log, str | Path):
-        log = read_log(Path(log), [cable.name for cable in loaded.cables])
+        log = read_measurements(Path(log), [cable.name for cable in loaded.cables])
     if isinstance(unknown, str):
         unknown = (unknown,)
     if not 0.0 < lead < np.inf:

@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 from scipy.stats import chi2
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot, calibration_model
 from cdpr_drake.analyses.fits.calibration import fit_robot
 from cdpr_drake.analyses.fits.poses import rest_poses
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
@@ -295,7 +295,7 @@ def start_row(seed: int) -> dict[str, Any]:
     lengths = Point(true, Stations.at(poses)).numbers[:, :, 0]
     noisy = lengths * (1.0 + LENGTH_SHARE * random.standard_normal(lengths.shape))
     counted = (noisy - lengths[0]) / (1.0 + tensions / robot.stiffness())
-    log = CalibrationLog(
+    log = Measurements(
         Path("simulated"), START_POSES, lengths=counted,
         tensions=tensions + TENSION_SIGMA * random.standard_normal(tensions.shape),
     )  # fmt: skip

@@ -179,7 +179,7 @@ COMMANDS = {
          "cdpr design acrobot_large --goal static --goal accuracy --quick"),
     ),
     "import-log": Command(
-        _MACHINES, f"{_CLI}.import_log:import_log",
+        _MACHINES, f"{_VERBS}.logs.import_log:import_log",
         "Reads a log as a machine or a tracker wrote it, and writes one that calibrate and "
         "identify take.",
         ("cdpr import-log series.txt --out series.csv",
@@ -209,7 +209,7 @@ COMMANDS = {
          "cdpr identify mine.yaml motion.csv --validate other_motion.csv"),
     ),
     "replay": Command(
-        _MACHINES, f"{_CLI}.replay:replay",
+        _MACHINES, f"{_VERBS}.logs.replay:replay_log",
         "Replays a log of a machine beside a model of it, with residuals by cable.",
         ("cdpr replay log.csv --robot hangprinter_4",
          "cdpr replay log.csv --robot mine.yaml --follow"),

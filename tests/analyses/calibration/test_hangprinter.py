@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.models.robot_loader import load_robot
 
@@ -51,7 +51,7 @@ def believed():
 
 
 def read():
-    return read_log(LOG, "ABCD")
+    return read_measurements(LOG, "ABCD")
 
 
 def calibrated(log=LOG, robot=None, **more):
@@ -73,7 +73,7 @@ def free():
 def test_the_log_that_import_log_writes_has_the_same_numbers(tmp_path):
     """The way that the guide goes: recorder's file, import-log, calibrate."""
     cdpr.import_log(LOG).write(tmp_path / "series.csv")
-    direct, imported = read(), read_log(tmp_path / "series.csv", "ABCD")
+    direct, imported = read(), read_measurements(tmp_path / "series.csv", "ABCD")
     np.testing.assert_allclose(imported.angles, direct.angles, rtol=1e-12)  # deg, as written
     np.testing.assert_allclose(imported.points, direct.points, rtol=1e-12)
 

@@ -9,7 +9,6 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import fit_robot
 from cdpr_drake.analyses.fits.setup import (
@@ -20,6 +19,7 @@ from cdpr_drake.analyses.fits.setup import (
 )
 from cdpr_drake.analyses.fits.starts import upright_minima, upside_down
 from cdpr_drake.analyses.fits.verdict import impossible_poses
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -82,7 +82,7 @@ def homing(resting):
     random = np.random.default_rng(1)
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
     tilts[:, 2] -= YAW
-    log = CalibrationLog(
+    log = Measurements(
         Path("homing"), len(poses), lengths=counted(lengths, NOISE * HOMING.lengths, random),
         swivels=counted(swivels, NOISE * HOMING.swivels, random),
         tensions=tensions + NOISE * 0.5 * random.standard_normal(tensions.shape),
@@ -107,7 +107,7 @@ def test_nothing_has_to_be_said(homing):
 def test_three_cables_without_tension_sensors_find_where_they_began(resting):
     """By winches and swivel angles alone."""
     (poses, _, lengths, swivels), random = resting, np.random.default_rng(2)
-    log = CalibrationLog(
+    log = Measurements(
         Path("homing"), len(poses), lengths=counted(lengths, SIGMAS.lengths, random),
         swivels=counted(swivels, SIGMAS.swivels, random),
     )  # fmt: skip

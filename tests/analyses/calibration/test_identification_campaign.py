@@ -6,8 +6,8 @@ import pytest
 
 from cdpr_drake.analyses.calibration import identification_campaign as campaign
 from cdpr_drake.analyses.calibration.identification_task import IdentificationTask, identify
-from cdpr_drake.analyses.calibration.log_file import read_log
 from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
@@ -71,7 +71,7 @@ def test_parameters_are_found_and_another_motion_is_explained(folder):
 def test_the_logs_that_it_leaves_say_the_same(folder):
     place, run = folder
     believed = load_robot(str(place / "believed_robot.yaml"))
-    log = read_log(place / "excitation.csv", [cable.name for cable in believed.cables])
+    log = read_measurements(place / "excitation.csv", [cable.name for cable in believed.cables])
     task = IdentificationTask(
         robot=believed, unknown=run.identification.task.unknown, bandwidth=campaign.BANDWIDTH,
         pulleys=False, sigma_lengths=campaign.SIGMA_LENGTHS,

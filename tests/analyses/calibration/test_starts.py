@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.fits import calibration
 from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -54,7 +54,7 @@ def planar_log(bad, sigma=2e-4, outliers=True):
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     readings = lengths + 2e-4 * random.standard_normal(lengths.shape)
     readings[8, 1] += bad
-    log = CalibrationLog(Path("plane"), 14, lengths=readings - readings[0])
+    log = Measurements(Path("plane"), 14, lengths=readings - readings[0])
     task = CalibrationTask(
         robot=robot, log=log, unknown=("length_offsets",), sigmas=Sigmas(lengths=sigma),
         start=poses[0], outliers=outliers,
@@ -123,7 +123,7 @@ def test_an_inclinometer_holds_what_lengths_leave_open():
     poses = logs.poses(6)
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    log = CalibrationLog(
+    log = Measurements(
         Path("tilted"), 6, lengths=lengths, tilts=tilts, torques=np.zeros((6, 4)),
         headers={"rpy": ("roll_rad",), "motor torques": ("C1_torque_nm", "C2_torque_nm")},
     )  # fmt: skip

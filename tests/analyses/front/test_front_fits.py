@@ -9,9 +9,9 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.calibration.identification_report import identification_dict
 from cdpr_drake.analyses.calibration.identification_task import IdentificationTask
 from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
-from cdpr_drake.analyses.calibration.log_file import read_log
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
 from cdpr_drake.analyses.fits.setup import CalibrationTask
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
@@ -44,7 +44,7 @@ def test_a_calibration(planar, tmp_path):
     path = tracked_poses(planar, tmp_path / "log.csv")
     unknown = {"unknown": ("C1.exit_point.x", "C1.exit_point.y")}
     found = cdpr.calibrate(planar, path, **unknown)
-    log = read_log(path, [cable.name for cable in planar.cables])
+    log = read_measurements(path, [cable.name for cable in planar.cables])
     same = calibration_fit(fit_robot(CalibrationTask(robot=planar, log=log, **unknown)))
     told, expected = as_json(found), json.loads(json.dumps(same.as_dict()))
     assert told.pop("seconds") > 0.0
@@ -74,7 +74,7 @@ def test_an_identification(tmp_path):
     path = tmp_path / "motion.csv"
     np.savetxt(path, rows, delimiter=",", header=",".join(header), comments="", fmt="%.12g")
     found = cdpr.identify(robot, path, pulleys=False)
-    log = read_log(path, [cable.name for cable in robot.cables])
+    log = read_measurements(path, [cable.name for cable in robot.cables])
     expected = identify_log(IdentificationTask(robot=robot, pulleys=False), log)
     np.testing.assert_array_equal(found.result.values, expected.result.values)
     assert found.as_dict()["parameters"] == identification_dict(expected)["parameters"]
