@@ -21,6 +21,7 @@ from cdpr_drake.analyses.fits.prediction import (
     next_poses,
     predicted,
 )
+from cdpr_drake.analyses.fits.rest_log import at_rest
 from cdpr_drake.analyses.fits.setup import (
     HOMING,
     CalibrationTask,
@@ -292,6 +293,7 @@ def fit_robot(
     Raises:
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
     """
+    task = at_rest(task)
     if hold_out is not None:
         return _held_out(task, hold_out, say)
     try:

@@ -156,7 +156,7 @@ def predicted(
     near = [np.argsort(np.abs(fitted - row), kind="stable")[: 2 * NEAR] for row in rows]
     whole = np.repeat(np.arange(len(rows)), [len(starts) for starts in near])
     program = CalibrationProgram(model, [setup.first] * count, (), motion=freedom.motion)
-    tensions = setup.guessed_tensions([setup.first] * count) if setup.rest else None
+    tensions = setup.guessed_tensions([setup.first] * count) if setup.task.rests else None
     setup.add_winches(program, tensions)
     here = result.stations.only(np.concatenate(near))
     t = None if tensions is None else tensions[rows[whole]]
@@ -292,7 +292,7 @@ def _expected(
         program.AddLengths(lengths, sigma, first_readings(setup.lengths))
     if log.swivels is not None:
         program.AddSwivels(simulated_swivels(model, poses, 0.0, random), sigmas.swivels)
-    if setup.rest:
+    if setup.task.rests:
         weight, com = robot.platform.mass * robot.gravity_vector(), robot.center_of_mass()
         program.AddRest(weight, com, sigmas.moments, sigmas.forces, tensions)
         if log.tensions is not None:

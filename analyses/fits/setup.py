@@ -113,6 +113,19 @@ class CalibrationTask:
     rest: bool | None = None
     outliers: bool = True
 
+    @property
+    def blind(self) -> bool:
+        """True if nothing but the robot itself tells where the platform is."""
+        point = self.log.points is not None and self.robot.motion_type().is_point
+        return self.log.poses is None and not self.log.corners and not point
+
+    @property
+    def rests(self) -> bool:
+        """True if the platform rested in all rows, see `rest`."""
+        if self.rest is not None:
+            return self.rest
+        return self.blind and (self.log.tensions is not None or self.log.swivels is not None)
+
 
 class StartPoint(NamedTuple):
     """A start of a search: a model with guesses of what readings count from, and poses X_WP [m]."""
@@ -131,7 +144,6 @@ class Setup:
         unknown: Groups and names of all that is unknown.
         priors: Standard deviations by group or name, with those of tags.
         first: Believed pose of the first row, X_WP [m].
-        rest: True if the platform rested in all rows.
         lengths, sigma: Readings of winches and their deviations, shape (k, m) [m]; or None.
         mount, pinhole: The camera's mounting, and the camera, if there are images.
         targets: The tags in the images.
@@ -145,7 +157,6 @@ class Setup:
     unknown: tuple[str, ...]
     priors: dict[str, float]
     first: RigidTransform
-    rest: bool
     lengths: Array | None = None
     sigma: Array | None = None
     mount: str | None = None
@@ -158,12 +169,6 @@ class Setup:
     def freedom(self) -> PoseFreedom:
         """The coordinates of poses that are unknown."""
         return PoseFreedom(self.task.robot.motion_type())
-
-    @property
-    def blind(self) -> bool:
-        """True if nothing but the robot itself tells where the platform is."""
-        point = self.points is not None and self.freedom.motion.is_point
-        return self.task.log.poses is None and not self.targets and not point
 
     @property
     def zeroed(self) -> bool:
@@ -207,7 +212,7 @@ class Setup:
                 corners = self._corners(self.targets)
                 poses = poses_by_tags(model, poses, self.targets, corners, self.pinhole)
         program = CalibrationProgram(model, poses, self.unknown, motion=self.freedom.motion)
-        self.add_winches(program, self.guessed_tensions(poses) if self.rest else None)
+        self.add_winches(program, self.guessed_tensions(poses) if self.task.rests else None)
         if log.poses is not None:
             program.AddTrackedPoses(log.poses, sigmas.turn, sigmas.place)
         if self.points is not None:
@@ -283,7 +288,7 @@ class Setup:
         # Balance is hard to follow from afar; it counts if lengths and the like are too few.
         readings = m * ((self.lengths is not None) + (log.swivels is not None))
         tensions = None
-        if self.rest and readings < freedom.motion.freedom:
+        if self.task.rests and readings < freedom.motion.freedom:
             tensions = np.array([self.guessed_tensions([seed] * count) for seed in seeds])
         trial = CalibrationProgram(models[0], [seeds[0]] * count, (), motion=freedom.motion)
         self.add_winches(trial, None if tensions is None else tensions[0])
@@ -367,14 +372,12 @@ def prepare(task: CalibrationTask) -> Setup:
     points, tracked = log.positions(robot), log.platform_poses(robot)
     setup = Setup(
         task, with_tags(calibration_model(robot, mount), known), tuple(unknown), priors,
-        first=on_motion(robot, task.start or robot.home.transform()), rest=False, lengths=lengths,
+        first=on_motion(robot, task.start or robot.home.transform()), lengths=lengths,
         mount=mount, pinhole=pinhole, tracked=tracked, points=points,
         targets={tag: TagTarget(tag, place.size) for tag, place in places.items()},
     )  # fmt: skip
-    rest = task.rest
-    if rest is None:
-        rest = setup.blind and (log.tensions is not None or log.swivels is not None)
-    setup = replace(setup, rest=rest, tracked=None if setup.frames_unknown() else tracked)
+    if setup.frames_unknown():
+        setup = replace(setup, tracked=None)
     if lengths is None:
         return setup
     # Readings may count from anything: lengths are those at the first pose and what came since.

@@ -288,7 +288,7 @@ def _elsewhere(
     measured = np.concatenate([term.measured() for term in program.terms], axis=1)
     nothing = np.zeros(measured.shape[1], dtype=bool)
     searches: list[tuple[int, Array, Array, npt.NDArray[np.bool_]]] = []  # row, start, left out
-    for k in range(count) if setup.blind else sorted(badly):
+    for k in range(count) if setup.task.blind else sorted(badly):
         others = [j for j in (k - 1, k + 1, 0, int(np.argmin(costs))) if 0 <= j < count]
         turns = np.concatenate([here.R[others], home.R, *(s.R[k : k + 1] for s in pool)])
         places = np.concatenate([here.p[others], home.p, *(s.p[k : k + 1] for s in pool)])
@@ -345,7 +345,7 @@ def _add_tie(
 
 def _other_firsts(setup: Setup) -> list[RigidTransform]:
     """Further first poses, if nothing but winches tells where the platform is."""
-    if not setup.blind:
+    if not setup.task.blind:
         return []
     robot, X = setup.task.robot, setup.first
     frame, random = robot.frame, np.random.default_rng(0)

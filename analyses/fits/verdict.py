@@ -307,7 +307,7 @@ def unused_columns(setup: Setup) -> tuple[str, ...]:
         why[ANGLES] = "there are cable lengths"
     if (log.poses is None and setup.points is None) or setup.lengths is None:
         why[TIME] = "without a tracker and lengths no clock is checked"
-    if not setup.rest:
+    if not setup.task.rests:
         why[TENSIONS] = "the platform is not said to rest; strain of cables alone"
     return tuple(
         f"not used: {', '.join(headers[kind])}: {words}"
