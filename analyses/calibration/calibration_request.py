@@ -224,17 +224,13 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
         unknown.append("swivel_offsets")
     points = _points_of(task, log)
     is_point = robot.motion_type().is_point
-    blind = log.poses is None and not targets and not (points is not None and is_point)
-    rest = task.rest
-    if rest is None:
-        rest = blind and (log.tensions is not None or log.swivels is not None)
     first = on_motion(robot, task.start or robot.home.transform())
     tracked = None if log.poses is None else list(log.poses)
     if points is not None and is_point:
         tracked = [_at_point(robot, p) for p in points]
     made = Prepared(
-        task, log, with_tags(model, known), lengths, None, first, rest, mount, pinhole, targets,
-        tuple(unknown), priors, tracked, points,
+        task, log, with_tags(model, known), lengths, None, first, rests(task, log), mount,
+        pinhole, targets, tuple(unknown), priors, tracked, points,
     )  # fmt: skip
     if unknown_frames(made) if points is None else turns_unknown(made):
         made = replace(made, tracked=None)
@@ -245,6 +241,16 @@ def prepare(task: CalibrationTask, log: CalibrationLog) -> Prepared:
     whole = Point(model, Stations.at([seed])).numbers[0, :, 0]
     whole = np.abs(whole + lengths - first_readings(lengths))
     return replace(made, sigma=np.hypot(sigmas.lengths, sigmas.lengths_share * whole))
+
+
+def rests(task: CalibrationTask, log: CalibrationLog) -> bool:
+    """True if the platform is said to rest in all rows, or if tensions or swivel angles, and
+    neither tracker nor tags, were measured."""
+    if task.rest is not None:
+        return task.rest
+    seen = log.points is not None and task.robot.motion_type().is_point
+    blind = log.poses is None and not log.corners and not seen
+    return blind and (log.tensions is not None or log.swivels is not None)
 
 
 def unknown_frames(prepared: Prepared) -> tuple[str, ...]:

@@ -32,6 +32,7 @@ from cdpr_drake.analyses.calibration.held_out import (
     predicted,
 )
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.calibration.rest_log import at_rest
 from cdpr_drake.analyses.calibration.tracker import (
     check_clock,
     with_tracker,
@@ -94,6 +95,7 @@ def calibrate(
     Raises:
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
     """
+    task, log = at_rest(task, log)
     if task.hold_out is not None:
         return _held_out(task, log, say)
     try:
