@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot
 from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, kept_fit, notes_table
 from cdpr_drake.analyses.fits.prediction import (
     EACH,
@@ -22,6 +21,7 @@ from cdpr_drake.analyses.fits.prediction import (
     predicted,
 )
 from cdpr_drake.analyses.fits.rest_log import at_rest
+from cdpr_drake.analyses.fits.robots import calibrated_robot
 from cdpr_drake.analyses.fits.setup import (
     HOMING,
     CalibrationTask,
@@ -88,8 +88,7 @@ MOST_NEXT = 200
 """Poses that are proposed at most."""
 
 UNKNOWN_ZERO = (
-    "its motor angles count from somewhere unknown; say at which pose they were zero: zero in "
-    "Python, --zero home or --zero POSE"
+    "its motor angles count from somewhere unknown; give the pose at which they were zero with zero"
 )
 """What is often missing if a log with motor angles is refused."""
 
@@ -199,10 +198,12 @@ def calibrate(
 
     Raises:
         CalibrationError: The log does not hold, or does not tell, what is asked; names it.
-        DataFileError: A file cannot be read.
+        LogFileError: The log cannot be read.
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
     loaded = as_robot(robot, "calibrate")
+    if tags is not None and tag_size is not None:
+        raise CalibrationError("tag_size: found beside tags; accepted: one of them")
     if isinstance(log, str | Path):
         log = read_measurements(log, [cable.name for cable in loaded.cables])
     if tracker_late is not None:
@@ -273,8 +274,6 @@ def _pose(robot: Robot, word: Any) -> Any:
 def _tag_places(seen: Sequence[int], tags: Any, size: float | None) -> dict[int, TagPlace]:
     if size is None:
         return read_tags(Path(tags)) if isinstance(tags, str | Path) else dict(tags or {})
-    if tags is not None:
-        raise CalibrationError("tag_size: found beside tags; accepted: one of them")
     if not 0.0 < size < 1e3:
         raise CalibrationError(f"tag_size: found {size:g}; accepted: > 0 [m]")
     return dict.fromkeys(seen, TagPlace(size))

@@ -19,7 +19,6 @@ from cyclopts import Parameter
 from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model, find_mount
 from cdpr_drake.analyses.fits.calibration import (
     Calibration,
     NextCount,
@@ -27,8 +26,9 @@ from cdpr_drake.analyses.fits.calibration import (
     fit_robot,
     with_next_poses,
 )
-from cdpr_drake.analyses.fits.fit import ROBOT, Fit, kept_fit
+from cdpr_drake.analyses.fits.fit import Fit, kept_fit
 from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
+from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
@@ -396,25 +396,23 @@ def _campaign_fit(
 ) -> Fit:
     """The fit of a campaign, with the servo that believes in it."""
     fit = calibration_fit(calibration)
-    with TemporaryDirectory() as place:  # the servo reads the calibrated robot from its file
-        file = Path(place, ROBOT)
+
+    def believing(folder: Path) -> Scenario:
+        """The servo that believes in the calibrated robot, from its file in a folder."""
+        file = folder / BELIEVED_FILE
         file.write_text(yaml_dump_typed(fit.model), encoding="utf-8")
-        again = calibrated_scenario(scene, recorded, calibration, str(file))
-        exact = replace(scene.scenario, perturbations=type(scene.scenario.perturbations)())
-        trials = in_turn(
-            {BEFORE: scene.scenario, "calibrated": again, TRUE: exact}, servo, follow, "Servoing"
-        )
-    if propose is not None:
-        fit = with_next_poses(fit, propose, follow.doing)
+        return calibrated_scenario(scene, recorded, calibration, str(file))
 
     def write(folder: Path) -> None:
         """Writes what is simulated, what is believed, and the scenario, as of every run."""
-        with TemporaryDirectory() as place:
-            file = Path(place, ROBOT)
-            file.write_text(yaml_dump_typed(fit.model), encoding="utf-8")
-            believing = calibrated_scenario(scene, recorded, calibration, str(file))
-            write_run_inputs(folder, believing, scene.robot)
+        write_run_inputs(folder, believing(folder), scene.robot)
 
+    exact = replace(scene.scenario, perturbations=type(scene.scenario.perturbations)())
+    with TemporaryDirectory() as place:
+        scenarios = {BEFORE: scene.scenario, "calibrated": believing(Path(place)), TRUE: exact}
+        trials = in_turn(scenarios, servo, follow, "Servoing")
+    if propose is not None:
+        fit = with_next_poses(fit, propose, follow.doing)
     errors = point_errors(scene, calibration)
     tables = [
         Table(

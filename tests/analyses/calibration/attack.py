@@ -18,7 +18,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import Sigmas
 from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.calibration.measurements import simulated_poses

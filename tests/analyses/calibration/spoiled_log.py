@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations

@@ -9,8 +9,8 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import (
     HOMING,
     CalibrationTask,

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import fit_robot
 from cdpr_drake.analyses.fits.poses import rest_poses
 from cdpr_drake.analyses.fits.prediction import next_poses
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.pose_design import expected_std

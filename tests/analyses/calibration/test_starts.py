@@ -8,8 +8,8 @@ import pytest
 from pydrake.math import RollPitchYaw
 
 from cdpr_drake.analyses.fits import calibration
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations

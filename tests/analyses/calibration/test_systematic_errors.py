@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles

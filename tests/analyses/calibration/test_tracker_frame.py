@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.tags import TagPlace, read_tags
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measurements import simulated_corners
