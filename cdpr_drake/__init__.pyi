@@ -5,10 +5,10 @@ from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
 from .analyses.exchange import import_robot as import_robot
 from .analyses.fits.camera import calibrate_camera as calibrate_camera
+from .analyses.fits.swings import identify_swings as identify_swings
 from .analyses.frame.follow import Follow as Follow
 from .analyses.front.calibration import calibrate as calibrate
 from .analyses.front.calibration import identify as identify
-from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.logs import import_log as import_log
 from .analyses.front.logs import replay_log as replay_log
 from .analyses.front.scenarios import load_scenario as load_scenario

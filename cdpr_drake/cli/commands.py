@@ -201,6 +201,12 @@ COMMANDS = {
         ("cdpr identify --campaign acrobot_computed_torque",
          "cdpr identify mine.yaml motion.csv --validate other_motion.csv"),
     ),
+    "identify-swings": Command(
+        _MACHINES, f"{_VERBS}.fits.swings:identify_swings",
+        "Finds a robot's dynamics in a log of a platform that swings on standing winches.",
+        ("cdpr identify-swings irma4u swings.csv",
+         "cdpr identify-swings irma4u swings.csv --stretches 32:36 --hold-out 20:24"),
+    ),
     "replay": Command(
         _MACHINES, f"{_CLI}.replay:replay",
         "Replays a log of a machine beside a model of it, with residuals by cable.",

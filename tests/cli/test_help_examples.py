@@ -46,6 +46,7 @@ LONG_WORK = {
         "cdpr_drake.analyses.front.simulated_fits.run_campaign",
     ],
     "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
+    "identify-swings": ["cdpr_drake.analyses.fits.swings.fit_free_motion"],
     "identify": [
         "cdpr_drake.analyses.front.calibration.identify_log",
         "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",

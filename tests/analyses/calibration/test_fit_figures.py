@@ -7,7 +7,8 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import free_motion_report, identification_report
+from cdpr_drake.analyses.calibration import identification_report
+from cdpr_drake.analyses.fits import swings
 from cdpr_drake.models.robot_loader import load_robot
 from tests.figure_faults import figure_faults
 
@@ -35,9 +36,9 @@ def found(count):
 
 def test_no_legend_lies_on_curves_and_titles_are_whole():
     for figure in (
-        free_motion_report._figure(found(1), "held_out"),
-        free_motion_report._unexplained_figure(found(1)),
-        free_motion_report._unexplained_figure(found(2)),
+        swings._turns_figure(found(1), found(1).held_out, "held out"),
+        swings._unexplained_figure(found(1)),
+        swings._unexplained_figure(found(2)),
     ):
         assert figure_faults(figure) == []
         assert all(axes.get_legend() is None for axes in figure.axes)
