@@ -97,7 +97,12 @@ def prepare(words, folder):
         (folder / name).write_text(OWN_ROBOT.read_text())
     for word in words[2:]:
         path = folder / word
-        if word.endswith(".csv") and words[1] in ("calibrate", "identify", "replay"):
+        if word.endswith(".csv") and words[1] in (
+            "calibrate",
+            "identify",
+            "identify-swings",
+            "replay",
+        ):
             path.write_text(lengths_log(named_robot(words, folder)))
     files = {
         "series.txt": hangprinter_script,

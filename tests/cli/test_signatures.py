@@ -34,7 +34,7 @@ OPTIONS = [
 ]  # fmt: skip
 ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
-    "--host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out",
+    "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only", "--out",
     "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
     "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
 }  # fmt: skip
@@ -104,7 +104,7 @@ SETTINGS = ("DesignSettings", "ProofSettings")
 CARRIED = 5
 """So many fields of a class may have the name of an option by chance."""
 
-TYPES = ("Parameter", "words", "one_of", "_names")
+TYPES = ("Parameter", "words", "one_of", "named_values", "whole", "_names")
 """What makes types of arguments, which may name options."""
 
 
