@@ -34,8 +34,8 @@ OPTIONS = [
 ]  # fmt: skip
 ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
-    "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only", "--out",
-    "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
+    "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
+    "--out", "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
     "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
