@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.calibration_request import TagPlace
 from cdpr_drake.analyses.calibration.columns import UNITS, Column, read_header, split_unit
 from cdpr_drake.analyses.calibration.log_file import (
     ParsedColumns,
@@ -17,6 +18,23 @@ from cdpr_drake.analyses.calibration.log_file import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
+
+
+class TagPlace(NamedTuple):
+    """A tag in the world.
+
+    Attributes:
+        size: Its edge [m].
+        X_WT: Its pose [m]; None if it is unknown.
+        sigma_place: Standard deviation of each coordinate of that pose [m]; 0 if it is exact.
+        sigma_turn: Standard deviation of its turn about each axis [rad].
+    """
+
+    size: float
+    X_WT: RigidTransform | None = None
+    sigma_place: float = 0.0
+    sigma_turn: float = 0.0
+
 
 SIGMAS = {"length": "sigma_place", "angle": "sigma_turn"}
 """Deviations by the dimension of their unit."""

@@ -77,6 +77,7 @@ class Fit(Result):
         shown: Its tables.
         drawings: Functions that draw its figures, by name; the most telling one is first.
         texts: Further files of its results folder, by name.
+        writer: Writes further files into a folder; None if there are none.
         model_file: Name of the model's file there.
         result: Solution of the room of mathematics, such as a `CalibrationResult`.
         source: What the fit is made of, for verbs that go on with it.
@@ -98,6 +99,7 @@ class Fit(Result):
     shown: tuple[Table, ...] = ()
     drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
+    writer: Callable[[Path], None] | None = None
     model_file: str = ROBOT
     result: Any = None
     source: Any = None
@@ -163,6 +165,9 @@ class Fit(Result):
         folder.write_text(self.model_file, yaml_dump_typed(self.model))
         for name, words in self.texts.items():
             folder.write_text(name, words)
+        if self.writer is not None:
+            with folder.files() as stage:
+                self.writer(stage)
 
     def with_more(
         self, tables: Sequence[Table] = (), *, details: Mapping[str, Any] | None = None,

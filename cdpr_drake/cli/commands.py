@@ -186,9 +186,16 @@ COMMANDS = {
          "cdpr import-log take.csv --log-format motive --out take_log.csv"),
     ),
     "calibrate": Command(
-        _MACHINES, f"{_CLI}.calibrate:calibrate",
+        _MACHINES, f"{_VERBS}.fits.calibration:calibrate",
         "Finds a robot's constants in a log of what was measured at poses of its platform.",
-        ("cdpr calibrate --campaign acrobot_sensors", "cdpr calibrate hangprinter_4 series.csv"),
+        ("cdpr calibrate hangprinter_4 series.csv",
+         "cdpr calibrate hangprinter_4 series.csv --zero home --hold-out 5"),
+    ),
+    "calibrate-campaign": Command(
+        _MACHINES, f"{_VERBS}.fits.campaign:calibrate_campaign",
+        "Calibrates the wrongly believed robot of a visual servo in simulation, and servoes again.",
+        ("cdpr calibrate-campaign acrobot_sensors",
+         "cdpr calibrate-campaign acrobot_sensors --poses 8 --next 3"),
     ),
     "calibrate-camera": Command(
         _MACHINES, f"{_VERBS}.fits.camera:calibrate_camera",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
-from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot, calibration_model
+from cdpr_drake.analyses.fits.calibrated_robot import calibrated_robot, calibration_model
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measurements import (
     simulated_corners,

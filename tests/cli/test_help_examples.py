@@ -41,10 +41,8 @@ LONG_WORK = {
     ],
     "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.results_folder"],
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],
-    "calibrate": [
-        "cdpr_drake.analyses.front.calibration.calibrate_log",
-        "cdpr_drake.analyses.front.simulated_fits.run_campaign",
-    ],
+    "calibrate": ["cdpr_drake.analyses.fits.calibration.fit_robot"],
+    "calibrate-campaign": ["cdpr_drake.analyses.fits.campaign.kept_fit"],
     "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
     "identify-swings": ["cdpr_drake.analyses.fits.swings.fit_free_motion"],
     "identify": [

@@ -36,7 +36,7 @@ QUESTIONS = {
         "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz] --bound tracker.[xyz]=0.001 "
         "--hold-out 8-9 --keep-outliers"
     ),
-    "calibrate/campaign": "calibrate --campaign acrobot_sensors --poses 8 --next 3",
+    "calibrate/campaign": "calibrate-campaign acrobot_sensors --poses 8 --next 3",
     "identify/motion": "identify acrobot_large motion.csv --validate motion_2.csv --no-pulleys",
     "identify/pulleys": "identify acrobot_large motion.csv",
     "identify/free": (

@@ -18,9 +18,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import Sigmas
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
+from cdpr_drake.analyses.fits.setup import Sigmas
 from cdpr_drake.calibration.measurements import simulated_poses
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits.calibrated_robot import calibration_model
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot

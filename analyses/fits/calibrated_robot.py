@@ -1,4 +1,4 @@
-"""Robots as calibrations see them, and robot files of what was found."""
+"""A robot as calibrations model it, and a robot file of what was fitted."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from cdpr_drake.analyses.calibration.log_fit import fitted_robot
+from cdpr_drake.analyses.fits.poses import schema_pose
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.geometry.poses import angles_from_rotation
-from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
+from cdpr_drake.models.robot_schema import CameraMount, Robot
 
 
 def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationModel:
@@ -26,13 +26,16 @@ def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationMode
     return replace(model, X_PC=find_mount(robot, mount).pose.transform())
 
 
-def find_mount(robot: Robot, name: str) -> CameraMount:
-    """A camera on the platform by the name of its mounting.
+def find_mount(robot: Robot, name: str | None) -> CameraMount:
+    """A camera on the platform by the name of its mounting; without a name the first.
 
     Raises:
         CalibrationError: There is none.
     """
-    mounts = {m.name: m for m in robot.cameras if m.parent == "platform"}
+    mounts = {mount.name: mount for mount in robot.cameras if mount.parent == "platform"}
+    if not mounts and not name:
+        raise CalibrationError(f"mount: found none on the platform of {robot.name}")
+    name = name or next(iter(mounts))
     if name not in mounts:
         raise CalibrationError(
             f"mount: found {name!r}; accepted: {', '.join(mounts) or 'none'}, on the platform of "
@@ -44,46 +47,37 @@ def find_mount(robot: Robot, name: str) -> CameraMount:
 def calibrated_robot(
     robot: Robot, result: CalibrationResult, mount: str | None = None
 ) -> tuple[Robot, tuple[str, ...]]:
-    """A robot with what was found, and in words what its file has no place for.
+    """A robot with the fitted constants, and in words what its file has no place for.
 
     Args:
         robot: The robot as it was believed.
-        result: What was found of it.
+        result: Its calibration.
         mount: The camera's mounting that was calibrated.
     """
     model, moved = result.model, set(result.names)
     cables = []
     for k, cable in enumerate(robot.cables):
-        radius = float(model.cables.pulley_radius[k])
-        own = f"{cable.name}.pulley_radius" in moved
-        drum = cable.drum_radius
+        drum, pulley = cable.drum_radius, cable.pulley_radius
         if f"{cable.name}.drum_radius" in moved:
             drum = (robot.winch.drum_radius if drum is None else drum) + float(model.drum_radius[k])
-        if drum is not None:
-            drum += model.common_drum_radius
+        if f"{cable.name}.pulley_radius" in moved:
+            pulley = float(model.cables.pulley_radius[k])
         cables.append(
             replace(
                 cable,
                 exit_point=cable.base_of(model.cables.p_WA[:, k]),
                 anchor_point=np.array(model.cables.p_PB[:, k]),
-                pulley_radius=radius if own else cable.pulley_radius,
-                drum_radius=drum,
+                pulley_radius=pulley,
+                drum_radius=None if drum is None else drum + model.common_drum_radius,
             )
         )
     cameras = [
-        replace(
-            one,
-            pose=Pose(
-                position=np.array(model.X_PC.translation()),
-                angles_deg=np.degrees(angles_from_rotation(model.X_PC.rotation())),
-            ),
-        )
-        if one.name == mount and one.parent == "platform"
-        else one
-        for one in robot.cameras
+        replace(camera, pose=schema_pose(model.X_PC))
+        if camera.name == mount and camera.parent == "platform"
+        else camera
+        for camera in robot.cameras
     ]
-    winch, left = robot.winch, []
-    scales = model.length_scale
+    winch, left, scales = robot.winch, [], model.length_scale
     if any(name.endswith(".length_scale") for name in moved):
         mean = float(np.mean(scales))
         winch = replace(winch, drum_radius=winch.drum_radius * mean)
