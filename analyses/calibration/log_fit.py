@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 from typing import Any
 
-from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
-from rich.table import Table
-
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.reporting.log_files import write_json, write_whole
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError, IdentificationError
@@ -20,37 +13,8 @@ from cdpr_drake.identification.result import IdentificationResult
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.time_shift import WORSE
 
-ROBOT = "robot.yaml"
-"""File of a results folder: the robot as it is believed now."""
-
 LATE = 0.25
 """A clock is off by more than this share of the time between rows."""
-
-
-@dataclass(frozen=True, eq=False)
-class LogFit:
-    """What is told of a robot that was fitted to a log.
-
-    Attributes:
-        robot: As it is believed now.
-        file: Name of the file of all numbers.
-        numbers: For JSON.
-        tables: For the terminal.
-        drawings: What draws the figures, by name.
-        fits: Whether it fits what was measured.
-    """
-
-    robot: Robot
-    file: str
-    numbers: dict[str, Any]
-    tables: Sequence[Table]
-    drawings: Mapping[str, Callable[[], Figure]]
-    fits: bool
-
-    def write(self, folder: Path) -> None:
-        """Writes the numbers and `robot.yaml` into a folder."""
-        write_json(folder / self.file, self.numbers)
-        write_whole(folder / ROBOT, yaml_dump_typed(self.robot))
 
 
 def fitted_robot(

@@ -1,4 +1,4 @@
-"""Options of commands that read logs, and the end of those that fit a robot to one."""
+"""Options of commands that read logs."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
-from cdpr_drake.analyses.frame.folder import shown_path
 from cdpr_drake.analyses.frame.words import one_of, words
-from cdpr_drake.analyses.front.fitted_robots import FittedRobot
 from cdpr_drake.analyses.logs.log_formats import AUTO, LOG_READERS
 from cdpr_drake.analyses.logs.log_request import (
     LogRequest,
@@ -17,9 +15,6 @@ from cdpr_drake.analyses.logs.log_request import (
     is_rate,
     read_mapping,
 )
-from cdpr_drake.analyses.reporting.folder_lock import free_folder
-from cdpr_drake.cli.process import MISFIT
-from cdpr_drake.cli.sessions import Answer, FollowedSession, failures
 from cdpr_drake.errors import CdprError
 
 
@@ -64,41 +59,4 @@ def log_request(
     return LogRequest(
         cables=None if cables is None else tuple(cables), units=unit or {}, body=body, rate=rate,
         mapping=None if mapping is None else read_mapping(mapping), R_WF=axes,
-    )  # fmt: skip
-
-
-def check_campaign(robot: object, log: object) -> None:
-    """Refuses a robot, a log or what goes with them beside a campaign.
-
-    Raises:
-        CdprError: There is one.
-    """
-    if robot is not None or log is not None:
-        raise CdprError(f"campaign: found beside {log or robot}; accepted: without robot, log")
-
-
-def robot_and_log(command: str, robot: Any, log: Path | None) -> tuple[Any, Path]:
-    """Both, where a command has no campaign.
-
-    Raises:
-        CdprError: One of them is missing.
-    """
-    if robot is None or log is None:
-        raise CdprError(f"{command}: found no robot or no log; accepted: both, or --campaign")
-    return robot, log
-
-
-def results_below_runs(out: Path | None, name: str) -> Path:
-    """The results folder that was asked for, or a free one."""
-    return out if out is not None else free_folder(Path("runs") / name)
-
-
-def fit_answer(fit: FittedRobot, session: FollowedSession) -> Answer:
-    """Tables of a fit and where the results are; `MISFIT` if it does not fit what was measured."""
-    folder = shown_path(fit.folder or Path())
-    missing = [f"The data is complete in {folder}"] if fit.failed else []
-    return Answer(
-        numbers=fit.as_dict(), printed=[*fit.tables(), f"results: {folder}"],
-        words=[*session.kept(), *missing], code=0 if fit.fits else MISFIT,
-        failed=failures(fit.failed, folder), drawing=fit.plot,
     )  # fmt: skip

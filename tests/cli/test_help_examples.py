@@ -45,10 +45,8 @@ LONG_WORK = {
     "calibrate-campaign": ["cdpr_drake.analyses.fits.campaign.kept_fit"],
     "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
     "identify-swings": ["cdpr_drake.analyses.fits.swings.fit_free_motion"],
-    "identify": [
-        "cdpr_drake.analyses.front.calibration.identify_log",
-        "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
-    ],
+    "identify": ["cdpr_drake.analyses.fits.identification.fit_dynamics"],
+    "identify-campaign": ["cdpr_drake.analyses.fits.identify_campaign.simulate_campaign"],
     "scenarios": ["cdpr_drake.systems.diagrams.load.load_scenario"],
     "study": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "reproduce": ["cdpr_drake.analyses.studies.study.finished_jobs"],

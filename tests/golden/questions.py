@@ -42,7 +42,7 @@ QUESTIONS = {
     "identify/free": (
         "identify-swings believed.yaml swings.csv --stretches 0:2.39 --hold-out 3.39:5.78"
     ),
-    "identify/campaign": "identify --campaign acrobot_computed_torque",
+    "identify/campaign": "identify-campaign acrobot_computed_torque",
     "calibrate-camera/charuco": f"calibrate-camera {CHARUCO} empty.png --board charuco {BOARD}",
     "calibrate-camera/chessboard": (
         f"calibrate-camera {CHESSBOARD} --board chessboard {BOARD} --model rational --keep-outliers"
