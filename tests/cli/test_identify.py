@@ -60,7 +60,8 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, capsy
     path, out = write(tmp_path / "log.csv", time, poses, tensions), tmp_path / "out"
     code, words, err = run(capsys, *identify(path, out))
     assert code == 6
-    assert "not written: [Errno 28]" in err
+    assert "validation.png: not written: " in err
+    assert "No space left" in err
     said = json.loads((out / "results.json").read_text())
     assert said["status"] == "misfit"
     assert said["residuals_over_sigma"] > said["misfit_factor"] == 3.0
