@@ -8,12 +8,11 @@ from .analyses.fits.calibration import calibrate as calibrate
 from .analyses.fits.camera import calibrate_camera as calibrate_camera
 from .analyses.fits.campaign import calibrate_campaign as calibrate_campaign
 from .analyses.fits.fit import Fit as Fit
+from .analyses.fits.identification import identify as identify
+from .analyses.fits.identify_campaign import identify_campaign as identify_campaign
+from .analyses.fits.swings import identify_swings as identify_swings
 from .analyses.frame.follow import Follow as Follow
-from .analyses.front.calibration import identify as identify
-from .analyses.front.free_motion import identify_free_motion as identify_free_motion
 from .analyses.front.scenarios import load_scenario as load_scenario
-from .analyses.front.session import Session as Session
-from .analyses.front.simulated_fits import identify_in_simulation as identify_in_simulation
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics

@@ -14,9 +14,15 @@ from pydrake.common.yaml import yaml_dump_typed
 from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError, IdentificationError
+from cdpr_drake.identification.result import IdentificationResult
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.numerics.time_shift import WORSE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,6 +35,9 @@ MISFIT, MISFIT_CODE = "misfit", 6
 
 MISFIT_FACTOR = 3.0
 """Residuals of so many sigmas, root mean square, are no fit."""
+
+LATE = 0.25
+"""A clock is off by more than this share of the time between rows."""
 
 
 @dataclass(frozen=True)
@@ -213,3 +222,44 @@ def kept_fit(
 def notes_table(notes: Sequence[tuple[str, str]]) -> list[Table]:
     """A table of notes, each with a word for what it is; none without notes."""
     return [Table("To know", ("what", "which"), notes)] if notes else []
+
+
+def fitted_robot(
+    robot: Robot, done: str, result: CalibrationResult | IdentificationResult, **changes: Any
+) -> Robot:
+    """A robot with what was found, and words of it among what its file assumes.
+
+    Args:
+        robot: As it was believed.
+        done: What was done with it, as "Calibrated".
+        result: What was found.
+        changes: Its new fields.
+    """
+    words = f"{done}: {result.status}, {len(result.names)} parameters."
+    return replace(robot, **changes, assumptions=f"{robot.assumptions} {words}".strip())
+
+
+def refuse_late_tracker(
+    log: Measurements, against: str, found: tuple[float, float], step: float,
+    error: type[CalibrationError] | type[IdentificationError],
+) -> None:  # fmt: skip
+    """Refuses a tracker that is out of sync.
+
+    Args:
+        log: The log with its poses.
+        against: What they were compared with.
+        found: By how much they are late [s], and how many times better they fit with that shift.
+        step: Time between rows [s].
+        error: What is raised.
+
+    Raises:
+        CalibrationError: It is, or an IdentificationError; says by how much.
+    """
+    shift, better = found
+    if better > WORSE and abs(shift) > LATE * step:
+        late = "late" if shift > 0.0 else "early"
+        raise error(
+            f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the {against}, "
+            f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
+            f"tracker_late {shift:.4g}"
+        )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cdpr_drake.analyses.calibration.log_fit import fitted_robot
+from cdpr_drake.analyses.fits.fit import fitted_robot
 from cdpr_drake.analyses.fits.poses import schema_pose
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.result import CalibrationResult

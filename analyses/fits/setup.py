@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analyses.calibration.log_fit import refuse_late_tracker
+from cdpr_drake.analyses.fits.fit import refuse_late_tracker
 from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
 from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.logs.measurements import Measurements, off_plane, on_motion

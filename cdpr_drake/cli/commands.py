@@ -204,9 +204,22 @@ COMMANDS = {
          "cdpr calibrate-camera images/*.png --squares 9x6 --size 0.025 --model fisheye"),
     ),
     "identify": Command(
-        _MACHINES, f"{_CLI}.identify:identify", "Finds a robot's dynamics in a log of a motion.",
-        ("cdpr identify --campaign acrobot_computed_torque",
+        _MACHINES, f"{_VERBS}.fits.identification:identify",
+        "Finds a robot's dynamics in a log of a motion.",
+        ("cdpr identify acrobot_large motion.csv",
          "cdpr identify mine.yaml motion.csv --validate other_motion.csv"),
+    ),
+    "identify-campaign": Command(
+        _MACHINES, f"{_VERBS}.fits.identify_campaign:identify_campaign",
+        "Identifies a scenario's robot with an unknown payload in simulation, and tracks again.",
+        ("cdpr identify-campaign acrobot_computed_torque",
+         "cdpr identify-campaign acrobot_computed_torque --unknown mass,center_of_mass,inertia"),
+    ),
+    "identify-swings": Command(
+        _MACHINES, f"{_VERBS}.fits.swings:identify_swings",
+        "Finds a robot's dynamics in a log of a platform that swings on standing winches.",
+        ("cdpr identify-swings irma4u swings.csv",
+         "cdpr identify-swings irma4u swings.csv --stretches 32:36 --hold-out 20:24"),
     ),
     "replay": Command(
         _MACHINES, f"{_VERBS}.logs.replay:replay_log",

@@ -1,76 +1,16 @@
-"""Fits as `Follow` and `Result` have it, until their verbs do that themselves."""
+"""What commands show whose verbs give no `Result`."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.analyses.frame.folder import shown_path
-from cdpr_drake.analyses.frame.follow import Follow, Progress
 from cdpr_drake.analyses.frame.result import Result, Table
-from cdpr_drake.analyses.front.session import Session
-from cdpr_drake.analyses.reporting.output_folder import ResultsFolder
-from cdpr_drake.cli.terminal import message_console
-from cdpr_drake.errors import CdprError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-NAMED = 3
-"""So many files that were kept are named."""
-
-
-class FollowedSession(Session):
-    """Tells who follows a command what a fit does, and which files were kept."""
-
-    def __init__(self, follow: Follow) -> None:
-        """Of one call."""
-        super().__init__()
-        self.follow = follow
-        self._results: ResultsFolder | None = None
-
-    def say(self, words: str) -> None:
-        """Says a line."""
-        self.follow.say(words)
-
-    def opened(self, results: ResultsFolder) -> None:
-        """Says where results of killed commands went that nobody has seen yet."""
-        self._results = results
-        for folder in results.recovered:
-            where = shown_path(folder)
-            self.say(f"Found finished results of a command that was killed; they are in {where}")
-
-    def kept(self) -> list[str]:
-        """Which files of others were kept when results were replaced, and where."""
-        if self._results is None:
-            return []
-        lines = []
-        for names, folder in self._results.kept:
-            more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-            lines.append(
-                f"Kept in {shown_path(folder)}: {', '.join(names[:NAMED])}{more}: not written by "
-                "cdpr as far as is known, or changed since"
-            )
-        return lines
-
-    @contextmanager
-    def doing(self, words: str) -> Iterator[Callable[[str], None]]:
-        """Tells what is done."""
-
-        def tell(what: str) -> None:
-            self.follow.progress(Progress(what, 0.0, 0.0))
-
-        tell(words)
-        yield tell
-
-
-def fit_session() -> FollowedSession:
-    """Of a fit, which Ctrl-C ends at once: nothing is finished and kept."""
-    return FollowedSession(Follow(say=message_console().print))
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)
@@ -127,34 +67,3 @@ class Answer(Result):
 def failures(failed: Mapping[str, str], folder: Path | None) -> dict[str, str]:
     """Paths of files that could not be written, and why."""
     return {str(name if folder is None else folder / name): why for name, why in failed.items()}
-
-
-def refuse(
-    verb: Callable[..., Any], values: Mapping[str, Any], beside: str, *,
-    names: Iterable[str] | None = None, accepted: Iterable[str] = (),
-) -> None:  # fmt: skip
-    """Refuses arguments that say nothing beside others.
-
-    Args:
-        verb: Whose arguments they are.
-        values: Of all its arguments, by name.
-        beside: Ends the refusal: beside what they were found, and what is accepted.
-        names: Those that are refused; None: all but `accepted`.
-        accepted: Those that are not.
-
-    Raises:
-        CdprError: One of them is not what the verb has by itself.
-    """
-    parameters = inspect.signature(verb).parameters
-    refused = [
-        name for name, parameter in parameters.items()
-        if (name in names if names is not None else name not in (*accepted, "follow"))
-        and not _same(values[name], parameter.default)
-    ]  # fmt: skip
-    refused.sort(key=lambda name: parameters[name].kind is inspect.Parameter.POSITIONAL_ONLY)
-    if refused:
-        raise CdprError(f"{', '.join(refused)}: found {beside}")
-
-
-def _same(value: Any, default: Any) -> bool:
-    return value is default or (isinstance(value, str | int | float) and value == default)

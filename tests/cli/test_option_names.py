@@ -5,7 +5,6 @@ import pytest
 from cdpr_drake.analyses.fits.calibration import calibrate
 from cdpr_drake.analyses.fits.campaign import calibrate_campaign
 from cdpr_drake.analyses.frame.follow import NOBODY
-from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.studies.study import run_study
@@ -58,8 +57,6 @@ NOWHERE = "192.0.2.1"
         (lambda: calibrate_campaign(SCENARIO, poses=6, poses_from="x.csv"),
          ["calibrate-campaign", SCENARIO, "--poses", "6", "--poses-from", "x.csv"],
          "poses: found beside poses_from", "--poses: found beside --poses-from"),
-        (lambda: identify_in_simulation(SCENARIO), ["identify", "--campaign", SCENARIO],
-         f"scenario: found {SCENARIO}", f"--campaign: found {SCENARIO}"),
     ],
 )  # fmt: skip
 def test_python_reads_arguments_and_the_command_options(

@@ -1,33 +1,50 @@
-"""A simulated campaign: an excitation is made, gone through and recorded, and the robot identified.
+"""An identification shown in simulation: the verb `identify_campaign`.
 
 The robot of a scenario carries a payload that its controller does not know, on cables and winches
 that are not quite those of its file, or it is believed to be another one, as the scenario says. It
-follows the excitation by motor torques on elastic cables; tracker and tension sensors are noisy.
-What is found is validated on the scenario's own motion, recorded in the same way, and that motion
-is followed again with what was found.
+follows an excitation by motor torques on elastic cables; tracker and tension sensors are noisy.
+The identified robot is validated on the scenario's own motion, recorded in the same way, and
+follows that motion again.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from cyclopts import Parameter
+from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.identification_task import (
+from cdpr_drake.analyses.fits.campaign import BEFORE, TRUE, campaign_scenario, in_turn
+from cdpr_drake.analyses.fits.dynamics import (
     Identification,
     IdentificationTask,
-    identify,
-)
-from cdpr_drake.analyses.calibration.identified_robots import (
-    dynamic_model,
+    fit_dynamics,
     identified_robot,
-    platform_size,
+)
+from cdpr_drake.analyses.fits.fit import ROBOT, Fit, kept_fit
+from cdpr_drake.analyses.fits.identification import Groups, group_names, identification_fit
+from cdpr_drake.analyses.fits.poses import schema_pose
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.result import Table
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import (
+    DEFAULT_FORMATS,
+    Formats,
+    OutFolder,
+    ScenarioWord,
+    Switch,
 )
 from cdpr_drake.analyses.logs.measurements import Measurements
-from cdpr_drake.analyses.runs.log import Log
+from cdpr_drake.analyses.reporting.exported_logs import write_columns
+from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
+from cdpr_drake.analyses.runs.log import Log, column_names
+from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import (
@@ -40,17 +57,27 @@ from cdpr_drake.identification.excitation import Excitation, ExcitationTask, des
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.regressor import central_parameters
 from cdpr_drake.models.materials import OwnMaterial
+from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.loops.motor_tracking import MotorTracking, TrackingSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, WinchSettings
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
+from cdpr_drake.systems.scenarios.tension_control_scenario import Stretch, TensionScenario
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
-CAMPAIGN_UNKNOWN = ("mass", "center_of_mass", "inertia", "stiffness", "friction", "static_friction")
-"""What a campaign seeks where nobody says."""
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+UNKNOWN = ("mass", "center_of_mass", "inertia", "stiffness", "friction", "static_friction")
+"""Groups that a campaign identifies by default."""
+
+TRUE_FILE, SCENARIO_FILE = "true_robot.yaml", "scenario.yaml"
+"""Files of a campaign's folder: the robot as it is, and the excitation as a scenario."""
+
+IDENTIFIED = "identified"
+"""The identified robot among those that a trial believes in."""
 
 PAYLOAD_SHARE = 0.25
 """Mass of the unknown payload over the platform's."""
@@ -87,61 +114,75 @@ ACCELERATION = 15.0
 
 @dataclass(frozen=True, eq=False)
 class DynamicCampaign:
-    """What a campaign made, recorded and found.
+    """A campaign in simulation.
 
     Attributes:
-        scenario: Whose robot was identified, and whose motion validates.
-        true: The robot as it is.
-        believed: As it was believed.
-        found: As it is believed now.
+        scenario: The scenario whose robot was identified, and whose motion validates.
+        true, believed: The robot as it is, and as it was believed to be.
         excitation: The motion that was fitted.
-        identification: What was found.
-        truth: Dynamics of the true robot.
-        logs: What was recorded, as `write_log` takes it, of "excitation" and "validation".
+        identification: The identification.
+        logs: The records of sensors, of "excitation" and "validation".
         tracking: Largest and mean distance [m] and angle [rad] from the desired pose on the
-            validation motion, by what was believed in.
+            validation motion, by the robot that is believed in.
     """
 
     scenario: TensionScenario
     true: Robot
     believed: Robot
-    found: Robot
     excitation: Excitation
     identification: Identification
-    truth: DynamicModel
-    logs: dict[str, Log]
-    tracking: dict[str, dict[str, float]]
+    logs: Mapping[str, Log]
+    tracking: Mapping[str, Mapping[str, float]]
 
-    def as_dict(self) -> dict[str, object]:
-        """For JSON, beside what `identification_dict` says."""
-        best = self.excitation
-        return {
-            "campaign": {
-                "scenario": self.scenario.name,
-                "seed": self.scenario.seed,
-                "excitation": {
-                    "poses": len(best.trajectory.poses) - 1,
-                    "duration_s": best.trajectory.end_time,
-                    "log_det_per_time": best.score,
-                    "log_det_per_time_of_random_poses": best.first_score,
-                    "condition": best.condition,
-                },
-                "tracking": self.tracking,
-            }
-        }
+    @property
+    def truth(self) -> DynamicModel:
+        """Dynamics of the true robot."""
+        return dynamic_model(self.true)
 
 
-def run_dynamic_campaign(
-    scenario: TensionScenario,
-    unknown: tuple[str, ...] = CAMPAIGN_UNKNOWN,
-    say: Callable[[str], None] = lambda words: None,
-) -> DynamicCampaign:
-    """Makes an excitation, records it, identifies, validates, and tracks again.
+@verb()
+def identify_campaign(
+    scenario: ScenarioWord, *, unknown: Groups = UNKNOWN, folder: OutFolder = None,
+    overwrite: Switch = False, formats: Formats = DEFAULT_FORMATS,
+    follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
+) -> Fit:  # fmt: skip
+    """Identifies a scenario's robot with an unknown payload in simulation, and tracks again.
+
+    It follows the excitation that tells most, is identified from what tracker, tension sensors and
+    winches record, and follows the scenario's own motion again. Writes what identify writes, logs
+    that identify reads, the true and the believed robot, and the excitation as scenario.yaml.
 
     Args:
         scenario: Dynamic control of a robot whose winches have motors.
         unknown: Groups of parameters.
-        say: Told what is done now.
+        folder: Results folder; default: runs/identify-campaign-SCENARIO; in Python nothing is kept.
+        overwrite: Replace results in the folder.
+        formats: Formats of the figures.
+        follow: Who follows the work.
+
+    Raises:
+        ScenarioError: The scenario is unknown, or of another kind.
+        IdentificationError: The robot is of no such kind.
+        RobotFileError: Its file does not say enough of the motors.
+        OutputFolderError: The folder holds other results or files, or cannot be written.
+    """
+    loaded = campaign_scenario(scenario, TensionScenario, "a scenario of tension_control")
+    groups = group_names(unknown)
+    arguments = plain({"verb": "identify_campaign", "scenario": loaded, "unknown": groups})
+
+    def work() -> Fit:
+        return _campaign_fit(simulate_campaign(loaded, groups, follow))
+
+    return kept_fit(
+        f"identify-campaign-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
+        formats=formats, follow=follow,
+    )  # fmt: skip
+
+
+def simulate_campaign(
+    scenario: TensionScenario, unknown: tuple[str, ...] = UNKNOWN, follow: Follow = NOBODY
+) -> DynamicCampaign:
+    """Designs an excitation, records it, identifies, validates, and tracks again.
 
     Raises:
         IdentificationError: The robot is of no such kind.
@@ -149,44 +190,98 @@ def run_dynamic_campaign(
     """
     random = np.random.default_rng([scenario.seed, 23])
     true, believed = campaign_robots(scenario, random)
-    pulleys = scenario.cables.pulleys
-    say("Choosing the excitation")
-    excitation = design_excitation(excitation_task(scenario, believed), POSES, random, say=say)
-    motions = {
-        "excitation": excitation.trajectory, "validation": scenario.trajectory.trajectory(),
-    }  # fmt: skip
+    follow.doing("Choosing the excitation")
+    excitation = design_excitation(
+        excitation_task(scenario, believed), POSES, random, say=follow.doing
+    )
+    own = scenario.trajectory.trajectory()
     logs: dict[str, Log] = {}
-    for name, motion in motions.items():
-        log, _ = follow(scenario, true, believed, motion, _teller(say, name))
+    for name, motion in {"excitation": excitation.trajectory, "validation": own}.items():
+        log, _ = track(scenario, true, believed, motion, partial(_tell, follow, name))
         logs[name] = recorded(log, random)
     task = IdentificationTask(
-        robot=believed, unknown=unknown, bandwidth=BANDWIDTH, pulleys=pulleys,
+        robot=believed, unknown=unknown, bandwidth=BANDWIDTH, pulleys=scenario.cables.pulleys,
         sigma_lengths=SIGMA_LENGTHS,
     )  # fmt: skip
-    read = {name: as_read(Path(f"{name}.csv"), log) for name, log in logs.items()}
-    identification = identify(task, read["excitation"], read["validation"], say)
-    found, _ = identified_robot(believed, identification.result)
-    tracking = {}
-    for who, robot in (("believed before", believed), ("identified", found), ("true", true)):
-        log, failures = follow(
-            scenario, true, robot, motions["validation"],
-            _teller(say, f"tracking, {who}"),
-        )  # fmt: skip
+    excited, validation = (_as_read(Path(f"{name}.csv"), log) for name, log in logs.items())
+    identification = fit_dynamics(task, excited, validation, follow.doing)
+    identified, _ = identified_robot(believed, identification.result)
+
+    def tracking(robot: Robot) -> dict[str, float]:
+        log, failures = track(scenario, true, robot, own, partial(_tell, follow, "tracking"))
         distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
-        tracking[who] = {
+        return {
             "largest_m": float(np.max(distance)), "mean_m": float(np.mean(distance)),
             "largest_rad": float(np.max(angle)), "mean_rad": float(np.mean(angle)),
             "infeasible_steps": float(failures),
         }  # fmt: skip
+
+    robots = {BEFORE: believed, IDENTIFIED: identified, TRUE: true}
     return DynamicCampaign(
-        scenario, true, believed, found, excitation, identification, dynamic_model(true), logs,
-        tracking,
+        scenario, true, believed, excitation, identification, logs,
+        in_turn(robots, tracking, follow, "Tracking"),
     )  # fmt: skip
 
 
-def _teller(say: Callable[[str], None], what: str) -> Callable[[float], None]:
-    """Says how far a motion is."""
-    return lambda time: say(f"{what}, {time:.0f} s")
+def _tell(follow: Follow, what: str, time: float) -> None:
+    follow.doing(f"{what}, {time:.0f} s")
+
+
+def _campaign_fit(campaign: DynamicCampaign) -> Fit:
+    """The fit of a campaign, with its logs, robots, scenario, table and figure."""
+    scenario, best = campaign.scenario, campaign.excitation
+
+    def write(folder: Path) -> None:
+        """Writes the logs."""
+        names = [cable.name for cable in campaign.true.cables]
+        for name, log in campaign.logs.items():
+            columns = column_names(log, {"cables": names})
+            table = np.column_stack(list(log.values())).T
+            write_columns(folder / f"{name}.csv", dict(zip(columns, table, strict=True)))
+
+    tracking = Table(
+        f"Tracking of {scenario.name}, not fitted",
+        ("robot believed in", "largest [mm]", "mean [mm]", "largest [deg]", "mean [deg]"),
+        [(who, *(f"{1e3 * row[f'{which}_m']:.3f}" for which in ("largest", "mean")),
+          *(f"{np.degrees(row[f'{which}_rad']):.3f}" for which in ("largest", "mean")))
+         for who, row in campaign.tracking.items()],
+    )  # fmt: skip
+    numbers = {
+        "scenario": scenario.name, "seed": scenario.seed, "tracking": campaign.tracking,
+        "excitation": {
+            "poses": len(best.trajectory.poses) - 1, "duration_s": best.trajectory.end_time,
+            "log_det_per_time": best.score, "log_det_per_time_of_random_poses": best.first_score,
+            "condition": best.condition,
+        },
+    }  # fmt: skip
+    fit = identification_fit(campaign.identification, campaign.truth).with_more(
+        [tracking], details={"campaign": numbers},
+        drawings={"tracking": lambda: _tracking_figure(campaign)},
+        texts={
+            TRUE_FILE: yaml_dump_typed(campaign.true),
+            BELIEVED_FILE: yaml_dump_typed(campaign.believed),
+            SCENARIO_FILE: yaml_dump_typed(_excitation_scenario(campaign)),
+        },
+    )  # fmt: skip
+    return replace(fit, writer=write, source=campaign)
+
+
+def _excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:
+    """The excitation as a scenario of the true robot, believed to be the identified one."""
+    motion, own = campaign.excitation.trajectory, campaign.scenario
+    poses = list(map(schema_pose, motion.poses))
+    trajectory = replace(
+        own.trajectory, start=poses[0], pause=motion.start_time, file=None,
+        stretches=[
+            Stretch(pose=pose, duration=duration)
+            for pose, duration in zip(poses[1:], motion.durations, strict=True)
+        ],
+    )  # fmt: skip
+    return replace(
+        own, name="excitation", title=f"Excitation for the robot of {own.name}", robot=TRUE_FILE,
+        duration=motion.end_time + 0.2, trajectory=trajectory,
+        perturbations=replace(own.perturbations, believed_robot=ROBOT),
+    )  # fmt: skip
 
 
 def campaign_robots(scenario: TensionScenario, random: np.random.Generator) -> tuple[Robot, Robot]:
@@ -252,7 +347,7 @@ def excitation_task(scenario: TensionScenario, believed: Robot) -> ExcitationTas
     )  # fmt: skip
 
 
-def follow(
+def track(
     scenario: TensionScenario,
     true: Robot,
     believed: Robot,
@@ -302,8 +397,8 @@ def recorded(log: Log, random: np.random.Generator) -> dict[str, Array]:
     }
 
 
-def as_read(path: Path, log: Log) -> Measurements:
-    """A recorded log as `read_log` gives it from a file."""
+def _as_read(path: Path, log: Log) -> Measurements:
+    """A recorded log as it is read from a file."""
     count = len(log["time"])
     if count < 2:
         raise IdentificationError(f"{path}: found {count} rows; accepted: a motion")
@@ -313,3 +408,23 @@ def as_read(path: Path, log: Log) -> Measurements:
         poses=[pose_from_row(row) for row in log["X_WP"]],
         torques=np.asarray(log["applied_torques"]),
     )  # fmt: skip
+
+
+def _tracking_figure(campaign: DynamicCampaign) -> Figure:
+    """Mean and largest errors of tracking, by the robot that is believed in."""
+    from cdpr_drake.analyses.frame.figures import bars, new_figure
+
+    figure, panels = new_figure(
+        1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"
+    )
+    units = (("m", 1e3, "distance [mm]"), ("rad", 180.0 / np.pi, "angle [deg]"))
+    for panel, (key, scale, label) in zip(panels, units, strict=True):
+        heights = {
+            which: [scale * row[f"{which}_{key}"] for row in campaign.tracking.values()]
+            for which in ("mean", "largest")
+        }
+        bars(panel, list(campaign.tracking), heights)
+        panel.set_yscale("log")
+        panel.set(ylabel=label, xlabel="robot believed in")
+    panels[0].legend()
+    return figure
