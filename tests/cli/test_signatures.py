@@ -39,9 +39,10 @@ OPTIONS = [
 ]  # fmt: skip
 ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
-    "--host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out",
-    "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
-    "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
+    "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
+    "--out", "--parameters", "--path", "--picture", "--poses-from", "--rails", "--reactions",
+    "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut", "--unknown",
+    "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
@@ -115,7 +116,7 @@ SETTINGS = ("DesignSettings", "ProofSettings")
 CARRIED = 5
 """So many fields of a class may have the name of an option by chance."""
 
-TYPES = ("Parameter", "words", "one_of", "_names")
+TYPES = ("Parameter", "words", "one_of", "_names", "whole", "named_values")
 """What makes types of arguments, which may name options."""
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.calibration.tag_file import read_tags
+from cdpr_drake.analyses.fits.tags import read_tags
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_from_angles
 
@@ -21,7 +21,7 @@ def written(tmp_path):
 
 @pytest.fixture
 def read(written):
-    return lambda text: read_log(written(text), CABLES)
+    return lambda text: read_measurements(written(text), CABLES)
 
 
 @pytest.mark.parametrize(
