@@ -11,7 +11,13 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import Folder, free_folder, read_marker, results_folder
+from cdpr_drake.analyses.frame.folder import (
+    Folder,
+    free_folder,
+    read_marker,
+    results_folder,
+    shown_path,
+)
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -28,7 +34,6 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.reporting.exported_logs import checked_log_formats, log_exports
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun
