@@ -46,6 +46,12 @@ def always_checkpoints(monkeypatch):
             "integration.loop=compiled", PROJECTED, "camera.latency_frames=1",
             "estimator.kind=fusion", "sensors.log=[tension, encoder, tracker]",
         )),
+        ("acrobot_switching", (
+            "integration.loop=compiled", PROJECTED, "estimator.compare=[first_image]",
+        )),
+        ("acrobot_slack_start_tca", (
+            "integration.loop=compiled", PROJECTED, "sensors.log=[tension]",
+        )),
         ("acrobot_pick_and_place", (PROJECTED,)),
         ("cable_arm_computed_torque", ()),
         ("mobile_bases_winches", ()),

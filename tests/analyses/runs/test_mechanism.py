@@ -137,18 +137,17 @@ def test_free_bodies_come_first_in_velocities_but_last_among_joints():
     ]  # fmt: skip
 
 
-def test_the_command_goes_on_in_its_folder(whole, capsys, tmp_path, monkeypatch):
+def test_the_command_goes_on_in_its_folder(whole, capsys, here):
     """The folder's scenario names mechanism and bodies elsewhere than the command's scenario."""
-    monkeypatch.chdir(tmp_path)
     scenario = load_scenario(BASES, ["duration=0.4"])
-    interrupted(scenario, tmp_path / "out", 0.15)
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
+    interrupted(scenario, here / "out", 0.15)
+    assert json.loads((here / "out" / "summary.json").read_text())["sim_time_s"] < 0.3
     changed = ("--set", "control.prestress=30")
     words = refuse(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out", *changed)
     assert "scenario.control.prestress is 60.0 there, 30.0 here" in words
     assert run(capsys, "simulate", BASES, "--duration", "0.4", "--out", "out")[0] == 0
     for name in ("log.npz", "log.csv", "scenario.yaml", "mechanism.yaml"):
-        assert (tmp_path / "out" / name).read_bytes() == (whole / name).read_bytes(), name
+        assert (here / "out" / name).read_bytes() == (whole / name).read_bytes(), name
 
 
 def test_what_speaks_against_a_run_is_told_and_one_of_too_long_steps_diverges():
@@ -203,16 +202,14 @@ def test_the_figure_of_what_computed_torque_could_not_do():
         (("serve", ARM), "kind: found mechanism; accepted by cdpr serve"),
     ],
 )
-def test_what_mechanisms_have_not_is_refused(capsys, tmp_path, monkeypatch, arguments, words):
-    monkeypatch.chdir(tmp_path)
+def test_what_mechanisms_have_not_is_refused(capsys, here, arguments, words):
     assert words in refuse(capsys, *arguments)
-    assert list(tmp_path.iterdir()) == []
+    assert list(here.iterdir()) == []
 
 
-def test_check_and_new_know_the_kind(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_check_and_new_know_the_kind(capsys, here):
     assert set(scenario_names("mechanism")) == {ARM, BASES}
     assert run(capsys, "new", "scenario", "mine", "--from", BASES)[0] == 0
     code, out, _ = run(capsys, "check", "mine.yaml")
     assert (code, out.strip()) == (0, "mine.yaml: valid scenario")
-    assert "# " in (tmp_path / "mine.yaml").read_text()
+    assert "# " in (here / "mine.yaml").read_text()

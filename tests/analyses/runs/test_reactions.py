@@ -63,7 +63,7 @@ def test_numbers_after_a_break_are_those_of_the_log():
     times, home = 0.1 * np.arange(8), robot.home.transform()
     x = 0.01 * np.array([0, 0, 0, 0, 1, 2, 2, 2.0])
     slack, tensions = np.zeros((8, 8)), np.full((8, 8), 10.0)
-    slack[:, 5], slack[3:5, 1] = 1.0, 1.0  # one broke; another hangs for 0.2 s
+    slack[:, 5], slack[2:4, 1] = 1.0, 1.0  # one broke; another hangs for 0.2 s
     tensions[1, 0], tensions[4, 0] = 90.0, 30.0  # the larger one was before
     rows = np.tile(pose_row(home), (8, 1))
     rows[:, 4] += x

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import loadmat
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import Follow
@@ -143,6 +144,9 @@ def test_all_runs_as_a_table(runs, tmp_path):
     assert list(rows[0]) == list(table) == list(runs.to_dataframe())
     errors = [float(row["final_position_error_m"]) for row in rows]
     np.testing.assert_array_equal(errors, table["final_position_error_m"])
+    runs.write_table(tmp_path / "runs.mat")
+    mat = loadmat(tmp_path / "runs.mat")
+    np.testing.assert_array_equal(mat["tension_n_max"].ravel(), table["tension_n.max"])
     with pytest.raises(OutputFormatError, match=r"accepted: \.csv, \.npz, \.mat, \.parquet"):
         runs.write_table(tmp_path / "runs.xlsx")
     records = list(runs.records)

@@ -40,13 +40,6 @@ TENSIONS = ("simulate", "acrobot_computed_torque", "--set", "integration.engine=
             "--duration", "0.3")  # fmt: skip
 
 
-@pytest.fixture
-def without_figures():
-    """Nobody looks at figures, which take longer to draw than a run to compute."""
-    with only(".mat", ".parquet"):
-        yield
-
-
 def interrupted(scenario, folder, sim_time):
     """A run that somebody stops at a simulated time [s]."""
     last = [0.0]
@@ -70,7 +63,7 @@ def same_files(one, other):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_it_writes_a_folder_prints_json_numbers_its_folders_and_takes_overrides(capsys, here):
     summary = told(capsys, *SHORT, "--out", "there", "--seed", "4")
     assert (summary["seed"], summary["outcome"]) == (4, "timeout")
@@ -167,7 +160,7 @@ def test_a_broken_graphics_driver_is_one_line(capsys, here, monkeypatch):
     assert not any(here.iterdir())
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
     loop = ("--set", "integration.engine=compiled", "--set", "integration.loop=compiled")
     out = " ".join(answer(capsys, *SERVO[:4], "--set", "duration=0.6", *loop).split())
@@ -194,7 +187,7 @@ distribution: {limits: LIMITS}
 """
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize(
     ("limits", "used", "remarks"),
     [
@@ -266,7 +259,7 @@ def test_sigterm_keeps_what_was_simulated(here):
     assert asked <= listed, "python -m tests.record_kernels makes a new list"
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("words", [SERVO, TENSIONS], ids=["servo", "tensions"])
 def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_figures(
     words, here, capsys, monkeypatch
@@ -335,7 +328,7 @@ def test_a_complete_run_is_read_again_and_what_is_missing_is_drawn(
     assert (here / "figure.svg").is_file()
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_run_without_all_its_files_is_simulated_again(here):
     assert ended(*SERVO, "--out", "whole") == 0
     for name in ("log.csv", "log.npz", "summary.json"):
@@ -346,7 +339,7 @@ def test_a_run_without_all_its_files_is_simulated_again(here):
         shutil.rmtree(here / "out")
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_an_interrupted_run_is_found_without_out_and_is_finished_by_its_name(here, capsys):
     scenario = load_scenario("planar_pbvs", ["camera.kind=projected", "duration=0.4"])
     base, words = here / "runs" / "planar_pbvs", ("planar_pbvs", "--camera", "projected")
@@ -367,7 +360,7 @@ def test_an_interrupted_run_is_found_without_out_and_is_finished_by_its_name(her
     assert "left: holds other results: interrupted_at_s is 0.2 there, not here; name" in said
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_full_disk_keeps_what_was_simulated(here, capsys, monkeypatch):
     append = log.DiskLog.append
 

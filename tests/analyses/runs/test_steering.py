@@ -98,11 +98,18 @@ def scenario(*settings):
     return load_scenario("acrobot_pbvs", (*SETTINGS, *settings))
 
 
-def by_hand(loaded, *acts):
-    """A run with acts at their times, and its messages by kind."""
-    ours, theirs = Pipe()
+def by_hand(loaded, *acts, enough=lambda messages: False):
+    """A run with acts at their times, and its messages by kind, of which some are enough."""
+    (ours, theirs), messages = Pipe(), {}
+
+    def read():
+        while ours.poll(0.0):
+            message = receive(ours)
+            messages.setdefault(message.kind, []).append(message.data)
+        return enough(messages)
+
     with ours, theirs:
-        steering, todo = Steering(loaded, theirs), list(acts)
+        steering, todo = Steering(loaded, theirs, read), list(acts)
 
         def prepare(run, simulator, diagram):
             steering.prepare(run, simulator, diagram)
@@ -117,10 +124,7 @@ def by_hand(loaded, *acts):
             simulator.set_monitor(monitor)
 
         run = ServoRun(loaded).simulate(follow=Follow(prepare=prepare, stop=steering.stop))
-        messages = {}
-        while ours.poll(0.0):
-            message = receive(ours)
-            messages.setdefault(message.kind, []).append(message.data)
+        read()
     return run, messages
 
 
@@ -155,6 +159,22 @@ def test_a_run_that_nobody_touches_is_as_without_and_a_stop_ends_it():
     assert [pace["speed"] for pace in messages["pace"]][:2] == [None, FASTEST_SPEED]
     assert stopped.stopped
     assert 0.2 <= stopped.sim_time < 0.6
+
+
+def test_a_run_that_stands_shows_once_how_it_stands():
+    calls, looks = [], []
+
+    def enough(messages):
+        """It stands and has waited for some looks; one that shows nothing ends at last, too."""
+        calls.append(0)
+        looks.extend(pace for pace in messages.get("pace", [])[-1:] if pace["paused"])
+        return len(looks) > 3 or len(calls) > 300
+
+    run, messages = by_hand(scenario(*OPEN), (0.1, {"what": "pause"}), enough=enough)
+    assert run.stopped
+    assert run.sim_time == looks[0]["t"] == pytest.approx(0.1, abs=0.02)
+    assert sum(pace["paused"] for pace in messages["pace"]) == 1
+    assert [image["t"] for image in messages["image"]].count(run.sim_time) == 1
 
 
 def test_acts_loops_and_sockets_that_are_not_accepted_are_refused_in_a_line():

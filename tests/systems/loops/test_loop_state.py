@@ -49,32 +49,6 @@ def loop_of(name, *changes):
     return ServoLoop(check_loop(load_scenario(name, options)))
 
 
-@pytest.mark.parametrize(
-    ("name", "changes"),
-    [
-        ("acrobot_switching", ["estimator.compare=[first_image]"]),
-        ("acrobot_slack_start_tca", ["sensors.log=[tension]"]),
-    ],
-)
-def test_another_loop_goes_on_from_a_state_to_the_same_bits(name, changes):
-    """From the middle of a period, as from a checkpoint; that loop had been elsewhere."""
-    first, second = loop_of(name, *changes), loop_of(name, *changes)
-    for loop, until in ((first, 0.25), (second, 0.1)):
-        loop.start()
-        loop.advance_to(until)
-    second.restore_state(first.state_arrays())
-    for loop in (first, second):
-        loop.log.clear()
-        loop.advance_to(0.5)
-    for ours, theirs in (
-        (first.log.read(), second.log.read()),
-        (first.state_arrays(), second.state_arrays()),
-    ):
-        assert list(ours) == list(theirs)
-        for key, values in ours.items():
-            assert values.tobytes() == theirs[key].tobytes(), key
-
-
 def test_speeds_that_no_step_can_follow_diverge():
     loop = loop_of("acrobot_pbvs")
     loop.start()

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.runs.along import assess_run
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import (
@@ -46,6 +46,7 @@ def folder(result, tmp_path_factory):
         with results.files() as stage:
             result.write_inputs(stage)
         result.write(results)
+        results.complete()
     return path
 
 
@@ -134,6 +135,7 @@ def test_the_command_writes_into_the_folder(folder, capsys):
     with np.load(folder / "stability.npz") as arrays:
         assert set(arrays) == {"time", *SIGNALS}
     assert (folder / "stability.png").is_file()
+    assert read_marker(folder)["complete"]
 
 
 def test_a_figure_that_fails_costs_nothing_else(folder, tmp_path, capsys, monkeypatch):
