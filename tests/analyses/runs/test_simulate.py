@@ -415,10 +415,13 @@ def test_two_writers_foreign_and_changed_files_are_refused_and_nothing_is_remove
                 cdpr.simulate("planar_pbvs", camera="projected", folder="out")
             lines.append(str(problem.value))
 
-    cdpr.simulate(
+    run = cdpr.simulate(
         DEFAULT_SCENARIO, camera="projected", duration=0.1, folder="out", follow=Follow(second)
     )
     assert "another command writes there" in lines[0]
+    assert run.log["time"][-1] == pytest.approx(0.1)
+    held = [path.resolve().name for path in Path("/proc/self/fd").iterdir()]
+    assert "log.npz" not in held
     (here / "out" / "mine.txt").write_text("mine")
     assert "holds files that cdpr did not write" in refuse(capsys, *words, "--overwrite")
     (here / "out" / "mine.txt").unlink()

@@ -9,13 +9,13 @@ import pytest
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.runs.samples import MarksPicture
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.steering import (
     BREAK,
     PUSH,
     UNTOUCHED,
     ByHand,
-    MarksPicture,
     Message,
     Pace,
     Steering,
