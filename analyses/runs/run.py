@@ -37,6 +37,7 @@ from cdpr_drake.analyses.runs.log import (
     DiskLog,
     Log,
     Recorder,
+    StoredLog,
     column_names,
     log_block,
     write_log,
@@ -288,7 +289,7 @@ class Run(Result):
         if (folder / PARTS).exists() or not all(path.is_file() for path in files):
             return False
         try:
-            self.log = np.load(files[0], allow_pickle=False)
+            self.log = StoredLog(files[0])
             self._summary = load_json(files[2].read_text(encoding="utf-8"))
         except (OSError, ValueError, zipfile.BadZipFile):
             return False
@@ -335,7 +336,7 @@ class Run(Result):
 
     def settle(self, folder: Folder, **more: Any) -> None:
         """Removes the log that grew: from now on `log` reads `log.npz`; `more` as of `complete`."""
-        self.log = np.load(folder.path / "log.npz", allow_pickle=False)
+        self.log = StoredLog(folder.path / "log.npz")
         shutil.rmtree(folder.path / PARTS, ignore_errors=True)
         folder.complete(**more)
 

@@ -9,7 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.steering import MarksPicture, shown_limits
+from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance

@@ -380,6 +380,14 @@ def test_a_full_disk_keeps_what_was_simulated(here, capsys, monkeypatch):
     assert not (here / "out" / log.PARTS).exists()
 
 
+@pytest.mark.usefixtures("without_pictures")
+def test_a_run_holds_no_log_open_once_it_is_written(here):
+    result = cdpr.simulate(DEFAULT_SCENARIO, camera="projected", duration=0.1, folder="out")
+    held = [path.resolve().name for path in Path("/proc/self/fd").iterdir()]
+    assert result.log["time"][-1] == pytest.approx(0.1)
+    assert "log.npz" not in held
+
+
 def test_warnings_go_to_the_log_if_nobody_follows_and_else_to_who_does(caplog):
     unseen = ["camera.kind=projected", "desired.position=[1.0, 0.0, 0.3]"]
     cdpr.simulate("planar_pbvs", unseen, duration=0.05)

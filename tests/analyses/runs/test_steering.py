@@ -9,6 +9,7 @@ import pytest
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.runs.samples import MarksPicture
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.steering import (
     BREAK,
@@ -16,7 +17,6 @@ from cdpr_drake.analyses.runs.steering import (
     PUSH,
     UNTOUCHED,
     ByHand,
-    MarksPicture,
     Message,
     Pace,
     Steering,
