@@ -15,10 +15,10 @@ from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.fit_programs import add_winches, guessed_tensions
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.point_terms import Course
 from cdpr_drake.calibration.pose_search import robust_poses
 from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.calibration.sensor_terms import Course
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_error

@@ -31,6 +31,9 @@ TRIED = {
 BY_CABLE = ("swivels", "lengths", "angles", "tensions")
 """Fields with a column a cable, each of which may be turned by itself."""
 
+MOST_TRIED = 60
+"""Rows by which signs are tried; of a longer log so many of its rows, since one sign holds in all."""
+
 TILTS = ("roll", "pitch", "yaw")
 
 
@@ -76,6 +79,12 @@ def turned_sensors(
         groups: Groups of its measurements that do not agree.
         refitted: Calibrates anew, from one start.
     """
+    if log.count > MOST_TRIED:
+        log = _fewer(log)
+        try:
+            result, groups = refitted(task, log)
+        except CalibrationError:
+            return turned_where_lost(task, log, refitted)
     gone = [group for group in groups if group.test == "dropped"]
     most = max((group.size for group in gone), default=0.0)
     lost = [g.quantity.removeprefix("readings of ") for g in gone if 2.0 * g.size >= most]
@@ -109,6 +118,13 @@ def turned_sensors(
     return _first_that_fits(task, _turned_cables(task, log, tried), refitted)
 
 
+def _fewer(log: CalibrationLog) -> CalibrationLog:
+    """A log as it is, or of a long one `MOST_TRIED` rows, evenly apart."""
+    if log.count <= MOST_TRIED:
+        return log
+    return log.only(np.linspace(0, log.count - 1, MOST_TRIED).astype(np.intp))
+
+
 def _is_clear(group: GroupFault) -> bool:
     """Whether a group says by itself what is wrong: rows, or a factor that is no sign."""
     if group.test == "rows":
@@ -126,6 +142,7 @@ def turned_where_lost(
         log: What was measured.
         refitted: Calibrates anew, from one start.
     """
+    log = _fewer(log)
     for kind, field in TRIED.items():
         values = getattr(log, field)
         if values is None:
