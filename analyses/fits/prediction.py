@@ -23,11 +23,11 @@ from cdpr_drake.calibration.measurements import (
     simulated_poses,
     simulated_swivels,
 )
-from cdpr_drake.calibration.point_terms import Course
 from cdpr_drake.calibration.pose_design import choose_poses, expected_std, informing_rows
 from cdpr_drake.calibration.pose_search import robust_poses
 from cdpr_drake.calibration.program import CalibrationProgram
 from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.calibration.sensor_terms import Course
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_error

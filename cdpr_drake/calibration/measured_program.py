@@ -12,15 +12,19 @@ from pydrake.solvers import MathematicalProgram
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import LeastSquares, Prior
-from cdpr_drake.calibration.onboard_terms import TagCorners, Tilts
 from cdpr_drake.calibration.parameters import (
     CalibrationModel,
     parameter_layout,
 )
-from cdpr_drake.calibration.point_terms import Course, TrackedPoints
 from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.program_costs import StationCost
-from cdpr_drake.calibration.rest_terms import RestrictedEquilibrium
+from cdpr_drake.calibration.sensor_terms import (
+    Course,
+    TagCorners,
+    Tilts,
+    TrackedPoints,
+    TrackedPoses,
+)
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.calibration.terms import (
     EquilibriumTerm,
@@ -28,9 +32,8 @@ from cdpr_drake.calibration.terms import (
     Swivels,
     Tensions,
     Term,
-    TrackedPoses,
+    ZeroedCables,
 )
-from cdpr_drake.calibration.zeroed_terms import ZeroedCables
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.motion_type import FREE, LEVEL, MotionType
 from cdpr_drake.numerics.own_terms import OwnTerms
@@ -280,7 +283,7 @@ class MeasuredCalibration(OwnTerms):
         )  # fmt: skip
         motion = self._freedom.motion
         whole = motion.is_free or motion.is_horizontal_body
-        term = EquilibriumTerm(*known) if whole else RestrictedEquilibrium(*known, motion)
+        term = EquilibriumTerm(*known, None if whole else motion)
         self.terms.append(term)
         return term
 
