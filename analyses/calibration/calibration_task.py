@@ -168,9 +168,7 @@ def _fitted(
     return prepared, best_of_starts(prepared, say, others)
 
 
-def _held_out(
-    task: CalibrationTask, log: Measurements, say: Callable[[str], None]
-) -> Calibration:
+def _held_out(task: CalibrationTask, log: Measurements, say: Callable[[str], None]) -> Calibration:
     """A calibration on some rows, the others predicted; or on all, each held out once."""
     assert task.hold_out is not None
     words, plain = task.hold_out, replace(task, hold_out=None)
