@@ -1,4 +1,4 @@
-"""A log from the columns of a file: units, names, axes, times and refusals, once for all dialects."""
+"""A log from the columns of a file: units, names, axes, times and refusals of all dialects."""
 
 from __future__ import annotations
 

@@ -299,7 +299,9 @@ def test_a_run_s_own_log_is_read(tmp_path):
 def test_numbers_that_have_no_square_are_refused(number, write):
     text = recorders.columns().replace("2000.250", number, 1)
     assert number in text
-    with pytest.raises(LogFileError, match=r"log.csv:2: C2_length_mm: found .*accepted: a number up"):
+    with pytest.raises(
+        LogFileError, match=r"log.csv:2: C2_length_mm: found .*accepted: a number up"
+    ):
         import_log(write("log.csv", text))
 
 
