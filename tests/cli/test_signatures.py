@@ -37,7 +37,7 @@ ANY_WORD = {
     "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
     "--out", "--parameters", "--path", "--picture", "--poses-from", "--rails", "--reactions",
     "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut", "--unknown",
-    "--workers", "--wrench-set",
+    "--validate", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
