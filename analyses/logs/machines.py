@@ -34,7 +34,9 @@ def _top(head: str) -> list[str]:
 
 _ARRAYS = ("motor_pos_samp", "xyz_of_samp", "force_samp")
 _MOTOR, _FORCE = re.compile(r"motor_([A-Za-z0-9]+)_deg"), re.compile(r"force_([A-Za-z0-9]+)")
-_NO_FORCE_UNIT = "the unit of the forces is not stated: kept as raw_force; --unit force=N"
+_NO_FORCE_UNIT = (
+    "the unit of the forces is not stated: kept as raw_force; cdpr import-log --unit force=N"
+)
 
 
 def knows_hangprinter(head: str) -> str:
@@ -388,7 +390,7 @@ def read_graffiti(path: Path, text: str, facts: Facts) -> Log:
             )
     if facts.rate is None:
         raise LogFileError(
-            f"{path}: time: found no column of times; accepted: one, or --rate [1/s]"
+            f"{path}: time: found no column of times; accepted: one, or use rate [1/s]"
         )
     table = np.array(rows)
     names = facts.names(path, (table.shape[1] - 5) // 4)
