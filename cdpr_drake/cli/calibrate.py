@@ -95,7 +95,8 @@ def calibrate(
         mount: Mounting of the camera; else the first on the platform.
         image_size: Width x height of images [px], as 640x480.
         start: Approximate pose of the first row: x,y,z[,phi,theta,psi] [m, deg].
-        rest: The platform rested in all rows, or did not; else the log tells.
+        rest: The platform rested in all rows, or did not; else the log tells. Of a log with times
+            means over rows at rest are taken.
         tracker_late: By how much the tracker's poses are late [s].
         zero: Pose at which lengths or motor angles were zero: home, or x,y,z[,phi,theta,psi] [m,
             deg]; else they count from anywhere.
