@@ -184,7 +184,8 @@ def calibrate(
         start: Approximate pose of the first row [m, deg]; default: home.
         zero: Pose at which lengths or motor angles were zero [m, deg]; default: they count from
             anywhere.
-        rest: The platform rested in all rows, or did not; default: the log tells.
+        rest: The platform rested in all rows, or did not; default: the log tells. Of a log with
+            times the means over rows at rest are fitted.
         tracker_late: Delay of the tracker's poses [s]; default: none, which is checked.
         hold_out: Tracked rows to predict and not to fit: a number of rows, rows as 100-160,200, or
             each, which repeats the calibration without each one of them.
