@@ -248,7 +248,7 @@ def calibrate(
 
 
 OPTIONS = (
-    "unknown", "priors", "bounds", "sigmas", "mount", "image_size", "start", "zero", "rest",
+    "unknown", "priors", "bounds", "sigmas", "tags", "mount", "image_size", "start", "zero", "rest",
     "outliers",
 )  # fmt: skip
 """Fields of a task by which the marker of a results folder tells calibrations apart."""
@@ -296,12 +296,17 @@ def fit_robot(
     task = at_rest(task)
     if hold_out is not None:
         return _held_out(task, hold_out, say)
+
+    def refitted(trial: CalibrationTask) -> BestFit:
+        """A fit from one start, to try what may be wrong of the log."""
+        say("Looking for signs that are turned")
+        return _best_fit(trial, others=False)[1]
+
     try:
         setup, best = _best_fit(task, say)
     except CalibrationError as problem:
         if str(problem).startswith(LOST):
-            say("Looking for signs that are turned")
-            turned = turned_where_lost(task, _refitted)
+            turned = turned_where_lost(task, refitted)
             if turned:
                 raise CalibrationError(f"{problem}; {turned[0]}") from problem
         raise
@@ -309,8 +314,7 @@ def fit_robot(
     up = setup.first.rotation().matrix()[:, 2]
     misfit = (*impossible_poses(task.robot, result, up)[0], *misfits(result, groups))
     if misfit:
-        say("Looking for signs that are turned")
-        misfit = (*turned_sensors(task, best, _refitted), *misfit)
+        misfit = (*turned_sensors(task, best, refitted), *misfit)
         result = replace(result, status=MISFIT)
     result, enlarged = with_enlarged_deviations(result, groups)
     remarks = doubts(setup, best, enlarged)
@@ -324,11 +328,6 @@ def _best_fit(
     say("Looking for where the poses were")
     setup = with_tracker(prepare(task))
     return setup, best_of_starts(setup, say, others)
-
-
-def _refitted(task: CalibrationTask) -> BestFit:
-    """A fit from one start, to try what may be wrong of a log."""
-    return _best_fit(task, others=False)[1]
 
 
 def _held_out(task: CalibrationTask, hold_out: str | int, say: Say) -> Calibration:

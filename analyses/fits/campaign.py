@@ -28,6 +28,7 @@ from cdpr_drake.analyses.fits.calibration import (
 )
 from cdpr_drake.analyses.fits.fit import Fit, kept_fit
 from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
+from cdpr_drake.analyses.fits.prediction import FRAMES_KNOWN
 from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.fits.tags import TagPlace
@@ -188,7 +189,7 @@ class Scene:
             program.AddPrior([name], std)
         problem, at = program.least_squares(), program.at()
         equations = problem.normal_equations(at, 0.0)
-        known = equations.S - equations.S_data + 1e-4 * np.eye(len(equations.S))
+        known = equations.S - equations.S_data + FRAMES_KNOWN * np.eye(len(equations.S))
         chosen, _ = choose_poses(informing_rows(problem, at), count, known)
         return in_short_hops([candidates[k] for k in chosen], self.nominal.home.transform())
 
