@@ -24,11 +24,10 @@ from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import simulated_corners
 from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.pose_search import guessed_stations
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line

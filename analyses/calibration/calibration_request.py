@@ -14,9 +14,9 @@ from cdpr_drake.analyses.calibration.log_fit import wound_lengths
 from cdpr_drake.analyses.calibration.motion_start import off_plane, on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.pose_freedom import PoseFreedom
+from cdpr_drake.calibration.program import first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.models.camera_catalogue import load_camera

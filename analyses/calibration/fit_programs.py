@@ -12,10 +12,9 @@ from cdpr_drake.analyses.calibration.calibration_request import Prepared
 from cdpr_drake.analyses.calibration.motion_start import off_plane
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, poses_by_tags, with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.pose_search import guessed_from
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_statics import tension_problem

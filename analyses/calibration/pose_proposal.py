@@ -19,14 +19,13 @@ from cdpr_drake.analyses.calibration.motion_start import off_plane
 from cdpr_drake.analyses.reporting.log_files import finite, write_whole
 from cdpr_drake.analyses.reporting.tables import new_table
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_poses,
     simulated_swivels,
 )
 from cdpr_drake.calibration.pose_design import choose_poses, expected_std, informing_rows
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import angles_from_rotation
 

@@ -32,7 +32,7 @@ BY_CABLE = ("swivels", "lengths", "angles", "tensions")
 """Fields with a column a cable, each of which may be turned by itself."""
 
 MOST_TRIED = 60
-"""Rows by which signs are tried; of a longer log so many of its rows, since one sign holds in all."""
+"""Rows by which signs are tried: of a longer log so many, since a sign holds in all of its rows."""
 
 TILTS = ("roll", "pitch", "yaw")
 
