@@ -184,7 +184,8 @@ def calibrate(
         start: Approximate pose of the first row [m, deg]; default: home.
         zero: Pose at which lengths or motor angles were zero [m, deg]; default: they count from
             anywhere.
-        rest: The platform rested in all rows, or did not; default: the log tells.
+        rest: The platform rested in all rows, or did not; default: the log tells. Of a log with
+            times the means over rows at rest are fitted.
         tracker_late: Delay of the tracker's poses [s]; default: none, which is checked.
         hold_out: Tracked rows to predict and not to fit: a number of rows, rows as 100-160,200, or
             each, which repeats the calibration without each one of them.
@@ -208,13 +209,12 @@ def calibrate(
         log = read_measurements(log, [cable.name for cable in loaded.cables])
     if tracker_late is not None:
         log = log.shifted(tracker_late)
-    default = unknown is None
     names = default_unknown(loaded, log) if unknown is None else _names(unknown)
     sigmas = dict(sigmas or {})
     for name in sigmas:
         if name not in vars(HOMING):
             raise CalibrationError(f"sigmas: found {name!r}; {accepted_names(name, vars(HOMING))}")
-    homing = default and is_homing(loaded, log)
+    homing = unknown is None and is_homing(loaded, log)
     task = CalibrationTask(
         robot=loaded, log=log, unknown=names, priors=dict(priors or {}), bounds=dict(bounds or {}),
         sigmas=replace(HOMING if homing else Sigmas(), **sigmas),
@@ -236,21 +236,14 @@ def calibrate(
         return fit if propose is None else with_next_poses(fit, propose, follow.doing)
 
     arguments = plain({
-        "verb": "calibrate", "robot": loaded.name, "log": str(log.path), "rows": log.count,
-        **{name: getattr(task, name) for name in OPTIONS}, "tracker_late": tracker_late,
-        "hold_out": hold_out, "propose": propose,
+        **vars(task), "verb": "calibrate", "robot": loaded.name, "log": str(log.path),
+        "rows": log.count, "tracker_late": tracker_late, "hold_out": hold_out, "propose": propose,
     })  # fmt: skip
     return kept_fit(
         f"calibrate-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
         formats=formats, follow=follow,
     )  # fmt: skip
 
-
-OPTIONS = (
-    "unknown", "priors", "bounds", "sigmas", "mount", "image_size", "start", "zero", "rest",
-    "outliers",
-)  # fmt: skip
-"""Fields of a task by which the marker of a results folder tells calibrations apart."""
 
 _SIGMAS = ", ".join(
     f.name + ("" if f.default is None else f" ({f.default:g})") for f in fields(Sigmas)
@@ -295,12 +288,17 @@ def fit_robot(
     task = at_rest(task)
     if hold_out is not None:
         return _held_out(task, hold_out, say)
+
+    def refitted(trial: CalibrationTask) -> BestFit:
+        """A fit from one start, to try what may be wrong of the log."""
+        say("Looking for signs that are turned")
+        return _best_fit(trial, others=False)[1]
+
     try:
         setup, best = _best_fit(task, say)
     except CalibrationError as problem:
         if str(problem).startswith(LOST):
-            say("Looking for signs that are turned")
-            turned = turned_where_lost(task, _refitted)
+            turned = turned_where_lost(task, refitted)
             if turned:
                 raise CalibrationError(f"{problem}; {turned[0]}") from problem
         raise
@@ -308,8 +306,7 @@ def fit_robot(
     up = setup.first.rotation().matrix()[:, 2]
     misfit = (*impossible_poses(task.robot, result, up)[0], *misfits(result, groups))
     if misfit:
-        say("Looking for signs that are turned")
-        misfit = (*turned_sensors(task, best, _refitted), *misfit)
+        misfit = (*turned_sensors(task, best, refitted), *misfit)
         result = replace(result, status=MISFIT)
     result, enlarged = with_enlarged_deviations(result, groups)
     remarks = doubts(setup, best, enlarged)
@@ -323,11 +320,6 @@ def _best_fit(
     say("Looking for where the poses were")
     setup = with_tracker(prepare(task))
     return setup, best_of_starts(setup, say, others)
-
-
-def _refitted(task: CalibrationTask) -> BestFit:
-    """A fit from one start, to try what may be wrong of a log."""
-    return _best_fit(task, others=False)[1]
 
 
 def _held_out(task: CalibrationTask, hold_out: str | int, say: Say) -> Calibration:

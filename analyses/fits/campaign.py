@@ -28,6 +28,7 @@ from cdpr_drake.analyses.fits.calibration import (
 )
 from cdpr_drake.analyses.fits.fit import Fit, kept_fit
 from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
+from cdpr_drake.analyses.fits.prediction import FRAMES_KNOWN
 from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.fits.tags import TagPlace
@@ -50,12 +51,11 @@ from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import simulated_corners
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.pose_search import guessed_stations
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError, ScenarioError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
@@ -188,7 +188,7 @@ class Scene:
             program.AddPrior([name], std)
         problem, at = program.least_squares(), program.at()
         equations = problem.normal_equations(at, 0.0)
-        known = equations.S - equations.S_data + 1e-4 * np.eye(len(equations.S))
+        known = equations.S - equations.S_data + FRAMES_KNOWN * np.eye(len(equations.S))
         chosen, _ = choose_poses(informing_rows(problem, at), count, known)
         return in_short_hops([candidates[k] for k in chosen], self.nominal.home.transform())
 

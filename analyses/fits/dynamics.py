@@ -61,7 +61,6 @@ class IdentificationTask:
         unknown: Groups of parameters, see `identification.parameters.GROUPS`.
         common: Groups with one value for all cables or winches.
         priors: Standard deviations by group.
-        bandwidth: Of the smoothing [Hz]; None: `USUAL_BANDWIDTH`, less for slow logs.
         sigma_lengths: Of lengths that winches count, and of the geometry [m].
         pulleys: True if the cables run over the robot's pulleys.
         outliers: True if outliers count less.
@@ -72,7 +71,6 @@ class IdentificationTask:
     unknown: tuple[str, ...] = UNKNOWN
     common: tuple[str, ...] = ()
     priors: Mapping[str, float] = field(default_factory=dict)
-    bandwidth: float | None = None
     sigma_lengths: float = 5e-5
     pulleys: bool = True
     outliers: bool = True
@@ -131,7 +129,7 @@ class Identification:
 
 def fit_dynamics(
     task: IdentificationTask, log: Measurements, validate: Measurements | None = None,
-    say: Callable[[str], None] = lambda words: None,
+    say: Callable[[str], None] = lambda words: None, bandwidth: float | None = None,
 ) -> Identification:  # fmt: skip
     """Identifies a robot.
 
@@ -140,13 +138,13 @@ def fit_dynamics(
         log: The log of a motion.
         validate: The log of another motion, which is predicted and not fitted.
         say: Called with a line on what is done now.
+        bandwidth: Of the smoothing [Hz]; None: `USUAL_BANDWIDTH`, less for slow logs.
 
     Raises:
         IdentificationError: A log does not hold, or does not tell, what is unknown; names it.
     """
     model = dynamic_model(task.robot)
     say("Smoothing the log")
-    bandwidth = task.bandwidth
     if bandwidth is None:
         time = _time(log)
         step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0

@@ -104,17 +104,18 @@ def identify(
     other = None if validate is None else _log(loaded, validate, tracker_late)
     task = IdentificationTask(
         robot=loaded, unknown=group_names(unknown), common=group_names(common),
-        priors=dict(priors or {}), bandwidth=bandwidth, sigma_lengths=sigma_lengths,
-        pulleys=pulleys, outliers=not keep_outliers, check_clock=tracker_late is None,
+        priors=dict(priors or {}), sigma_lengths=sigma_lengths, pulleys=pulleys,
+        outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
     arguments = {
         "verb": "identify", "robot": loaded.name, "log": str(fitted.path),
         "validate": None if other is None else str(other.path), "tracker_late": tracker_late,
+        "bandwidth": bandwidth,
         **{name: value for name, value in vars(task).items() if name != "robot"},
     }  # fmt: skip
 
     def work() -> Fit:
-        return identification_fit(fit_dynamics(task, fitted, other, follow.doing))
+        return identification_fit(fit_dynamics(task, fitted, other, follow.doing, bandwidth))
 
     return kept_fit(
         f"identify-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,

@@ -200,11 +200,11 @@ def simulate_campaign(
         log, _ = track(scenario, true, believed, motion, partial(_tell, follow, name))
         logs[name] = recorded(log, random)
     task = IdentificationTask(
-        robot=believed, unknown=unknown, bandwidth=BANDWIDTH, pulleys=scenario.cables.pulleys,
+        robot=believed, unknown=unknown, pulleys=scenario.cables.pulleys,
         sigma_lengths=SIGMA_LENGTHS,
     )  # fmt: skip
     excited, validation = (_as_read(Path(f"{name}.csv"), log) for name, log in logs.items())
-    identification = fit_dynamics(task, excited, validation, follow.doing)
+    identification = fit_dynamics(task, excited, validation, follow.doing, BANDWIDTH)
     identified, _ = identified_robot(believed, identification.result)
 
     def tracking(robot: Robot) -> dict[str, float]:

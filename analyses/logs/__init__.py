@@ -1,4 +1,4 @@
-"""Logs of real machines: read as recorders write them, converted, joined, bound to a robot, replayed.
+"""Logs of real machines: read as recorders write them, joined, bound to a robot, replayed.
 
 `read_log` reads a file in one of the `DIALECTS` into a `Log`: a table with SI units in its names,
 and a ledger with a row for each column of the file: its unit and who said it, its name, or why it

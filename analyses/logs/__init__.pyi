@@ -1,7 +1,6 @@
 from .dialects import DIALECTS as DIALECTS
 from .dialects import Dialect as Dialect
 from .dialects import read_log as read_log
-from .import_log import import_log as import_log
 from .log import Facts as Facts
 from .log import Log as Log
 from .measurements import Measurements as Measurements

@@ -1,4 +1,4 @@
-"""A log from the columns of a file: units, names, axes, times and refusals, once for all dialects."""
+"""A log from the columns of a file: units, names, axes, times and refusals of all dialects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ READ, WORDS, WORSE, LEFT_OUT = "read", "words", "worse", "left out"
 
 _ENDS = {"header": " by its header", "told": f", {AS_TOLD}", "dates": "",
          "format": " by the format",
-         "assumed": ", since neither header nor --unit says another"}  # fmt: skip
+         "assumed": ", since neither header nor user says another"}  # fmt: skip
 
 
 def assemble(

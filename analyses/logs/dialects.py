@@ -225,8 +225,8 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
     if not name and facts.mapping is None and not facts.robot_cables:
         raise LogFileError(
             f"{path}: found a file that no reader of logs recognises; accepted: "
-            f"{', '.join(DIALECTS)}, named by --log-format; columns of numbers without a header "
-            "need --mapping"
+            f"{', '.join(DIALECTS)}, named by log_format; columns of numbers without a header "
+            "need a mapping"
         )
     how = DIALECTS[name or CSV]
     text = "" if how.binary else read_text(path)
@@ -260,7 +260,7 @@ def recognise(path: Path) -> tuple[str, str]:
         words = "; ".join(f"{name}, as {why}" for name, why in fits.items())
         raise LogFileError(
             f"{path}: found a file that several readers recognise: {words}; accepted: one of them, "
-            "named by --log-format"
+            "named by log_format"
         )
     return next(iter(fits.items()), ("", ""))
 

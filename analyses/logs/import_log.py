@@ -127,8 +127,7 @@ def facts_of(
 @verb()
 def import_log(
     file: InputFile, /, *, out: OutFile = None,
-    beside: Annotated[Path | str | None, words(Path, "the path of a file", "FILE", name="--with")]
-    = None,
+    beside: Annotated[Path | None, Parameter(name="--with")] = None,
     log_format: LogFormat = AUTO, with_format: LogFormat = AUTO, robot: RobotWord = None,
     cables: Names | None = None, unit: Units = None, mapping: MappingFile = None,
     rate: Rate = None, body: str | None = None, axes: Axes = None,
@@ -173,9 +172,9 @@ def import_log(
         if target is not None and source is not None and target.resolve() == Path(source).resolve():
             raise OutputFolderError(f"out: found {out}, the log itself; accepted: another file")
     if target is not None and target.exists() and not overwrite:
-        raise OutputFolderError(f"out: found {out}; accepted: a new file, or --overwrite")
+        raise OutputFolderError(f"out: found {out}; accepted: a new file, or add overwrite")
     if robot is not None and cables is not None:
-        raise CdprError("cables: found beside --robot; accepted: one of them")
+        raise CdprError("cables: found with robot; accepted: one of them")
     if robot is not None:
         cables = [cable.name for cable in as_robot(robot, "import_log").cables]
     facts = facts_of(cables, unit=unit, mapping=mapping, rate=rate, body=body, axes=axes)

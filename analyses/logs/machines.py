@@ -34,7 +34,9 @@ def _top(head: str) -> list[str]:
 
 _ARRAYS = ("motor_pos_samp", "xyz_of_samp", "force_samp")
 _MOTOR, _FORCE = re.compile(r"motor_([A-Za-z0-9]+)_deg"), re.compile(r"force_([A-Za-z0-9]+)")
-_NO_FORCE_UNIT = "the unit of the forces is not stated: kept as raw_force; --unit force=N"
+_NO_FORCE_UNIT = (
+    "the unit of the forces is not stated: kept as raw_force; cdpr import-log --unit force=N"
+)
 
 
 def knows_hangprinter(head: str) -> str:
@@ -70,8 +72,8 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
             wide = [row for row in rows if len(row) != len(shown[name])]
             if wide or len(rows) > len(motors):
                 raise LogFileError(
-                    f"{path}: {name}: found {len(rows)} rows of {len((wide or rows)[0])}; accepted: "
-                    f"at most {len(motors)} of {len(shown[name])}"
+                    f"{path}: {name}: found {len(rows)} rows of {len((wide or rows)[0])}; "
+                    f"accepted: at most {len(motors)} of {len(shown[name])}"
                 )
             if rows:
                 rows += [[""] * len(shown[name])] * (len(motors) - len(rows))
@@ -211,8 +213,8 @@ def _belts(path: Path, number: int, words: str) -> dict[str, str]:
         name, mark, value = (part.strip().strip("\"'") for part in pair.partition(":"))
         if not mark or not value or not is_number(value) or name in belts:
             raise LogFileError(
-                f"{path}:{number}: found {pair.strip()[:40]!r}; accepted: belts with their lengths, "
-                "each once, as bl:2376.69"
+                f"{path}:{number}: found {pair.strip()[:40]!r}; accepted: belts with their "
+                "lengths, each once, as bl:2376.69"
             )
         belts[name] = value
     return belts
@@ -243,10 +245,8 @@ def knows_grab(head: str) -> str:
     """Recognises lines type,time,... of actuators and of the inclinometer."""
     lines = [line.split(",") for line in _top(head)]
     widths = [len(line) for line in lines if line[0] == _ACTUATOR and len(line) in _LAYOUTS]
-    known = [
-        line for line in lines
-        if len(line) == {_ACTUATOR: widths[:1] and widths[0], _INCLINOMETER: _TILT_CELLS}.get(line[0])
-    ]  # fmt: skip
+    width_of = {_ACTUATOR: (widths or [0])[0], _INCLINOMETER: _TILT_CELLS}
+    known = [line for line in lines if len(line) == width_of.get(line[0])]
     values = all(is_number(cell) and cell.strip() for line in known for cell in line)
     if len(lines) < 2 or not widths or not values or len(known) < 0.6 * len(lines):
         return ""
@@ -325,8 +325,8 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         told = ", ".join(f"{count} of type {kind}" for kind, count in sorted(other.items()))
         remarks.append(f"lines of other devices were left out: {told}")
     if latest:
-        remarks.append(f"{latest} lines that came up to {1e3 * _JITTER:g} ms after the first one of "
-                       "their row stand in that row")  # fmt: skip
+        late = f"{latest} lines that came up to {1e3 * _JITTER:g} ms"
+        remarks.append(f"{late} after the first one of their row stand in that row")
     units = {
         "lengths, swivels, tensions": "m, rad, N by the format",
         "roll, pitch, yaw": "deg by the format",
@@ -390,7 +390,7 @@ def read_graffiti(path: Path, text: str, facts: Facts) -> Log:
             )
     if facts.rate is None:
         raise LogFileError(
-            f"{path}: time: found no column of times; accepted: one, or --rate [1/s]"
+            f"{path}: time: found no column of times; accepted: one, or use rate [1/s]"
         )
     table = np.array(rows)
     names = facts.names(path, (table.shape[1] - 5) // 4)

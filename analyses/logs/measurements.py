@@ -1,4 +1,4 @@
-"""Logs bound to a robot: the one way from a log to lengths, poses and tensions for every command."""
+"""Logs bound to a robot: the one way from a log to lengths, poses, tensions for all commands."""
 
 from __future__ import annotations
 
@@ -246,15 +246,15 @@ def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
     for kind in (LENGTHS, ANGLES, SWIVELS, TENSIONS, TORQUES):
         names = [f"{cable}_{CABLE_QUANTITIES[kind][0]}" for cable in cables]
         present = set(names) & set(frame)
-        tables[kind] = frame.reindex(columns=names).to_numpy(float) if present else None
-    position = frame.reindex(columns=list(PARTS[POSITION])).to_numpy(float)
+        tables[kind] = _table(frame, names) if present else None
+    position = _table(frame, PARTS[POSITION])
     kinds = [kind for kind in ROTATIONS if set(PARTS[kind]) & set(frame)]
     placed = bool(set(PARTS[POSITION]) & set(frame))
     poses = tilts = points = None
     if placed and kinds:
         poses = poses_of(path, {str(name): frame[name].to_numpy() for name in frame})
     elif kinds and RPY in kinds:
-        tilts = frame.reindex(columns=list(PARTS[RPY])).to_numpy(float)
+        tilts = _table(frame, PARTS[RPY])
     elif kinds:
         columns = {str(name): frame[name].to_numpy() for name in frame}
         rotations = _rotations(path, kinds[0], columns)
@@ -277,6 +277,11 @@ def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
         corners=_corners(path, frame), tilts=tilts, points=points, headers=headers,
         remarks=(*remarks, *words),
     )  # fmt: skip
+
+
+def _table(frame: pd.DataFrame, names: Sequence[str]) -> Array:
+    """Columns beside each other, shape (k, n); NaN for those that are not there."""
+    return np.array(frame.reindex(columns=list(names)), float)
 
 
 def _robot_columns(log: Log, names: Sequence[str]) -> tuple[pd.DataFrame, set[str], list[str]]:
@@ -367,7 +372,7 @@ def _corners(path: Path, frame: pd.DataFrame) -> dict[int, Array]:
     corners = {}
     for tag in tags:
         names = [f"tag{tag}_{axis}{corner}_px" for corner in (1, 2, 3, 4) for axis in "uv"]
-        uv = frame.reindex(columns=names).to_numpy(float)
+        uv = _table(frame, names)
         seen = np.isfinite(uv).sum(axis=1)
         if np.any((seen > 0) & (seen < 8)):
             k = int(np.argmax((seen > 0) & (seen < 8)))

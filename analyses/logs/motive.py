@@ -119,11 +119,11 @@ def _unit(path: Path, settings: dict[str, str], facts: Facts) -> tuple[str, str]
     if known is None and told is None:
         raise LogFileError(
             f"{path}: Length Units: found {named or 'none'}; {accepted_names(named, _UNITS)}, or "
-            "--unit length=m, mm or cm"
+            "use unit length=m, mm or cm"
         )
     if known is not None and told not in (None, known):
         raise LogFileError(
-            f"{path}: Length Units: found {named}, and {told} told by --unit; accepted: one of them"
+            f"{path}: Length Units: found {named}, and {told} with unit; accepted: one of them"
         )
     if known is not None:
         return known, f"{named.lower()} by the file's Length Units"
@@ -168,7 +168,7 @@ def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:
         return facts.body
     visible = [name for name, count in bodies.items() if count]
     if len(visible) > 1:
-        raise LogFileError(f"{path}: body: found {words}; accepted: one of them by --body")
+        raise LogFileError(f"{path}: body: found {words}; accepted: one of them; use body")
     if not visible and not any(kind == MARKER for kind, _ in groups):
         raise LogFileError(f"{path}: found no rigid body and no marker; accepted: one at least")
     return visible[0] if visible else ""

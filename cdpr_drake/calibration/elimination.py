@@ -11,8 +11,8 @@ Marquardt for the damping; Huber for the loss.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,9 @@ standard deviations."""
 
 MOST_STEPS = 100
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-12, 1e12
+
+MOST_POSES = 500
+"""Poses whose derivatives are in memory at a time."""
 
 SINGULAR = 1e-13
 """Smallest over largest eigenvalue of a pose's own normal equations; below, nothing determines
@@ -113,8 +116,24 @@ class LeastSquares:
 
     def used(self, at: Point) -> npt.NDArray[np.bool_]:
         """Which parameters, unknown or not, measurements depend on, shape (n,)."""
-        slopes = [np.any(term.evaluate(at)[1] != 0.0, axis=(0, 1)) for term in self.terms]
+        slopes = [
+            np.any(term.evaluate(there)[1] != 0.0, axis=(0, 1))
+            for part, there in self.blocks(at)
+            for term in part.terms
+        ]
         return np.any(np.array(slopes), axis=0)
+
+    def blocks(self, at: Point) -> Iterator[tuple[LeastSquares, Point]]:
+        """The problem at `MOST_POSES` poses after the other, and these poses."""
+        count = at.stations.count
+        if count <= MOST_POSES:
+            yield self, at
+            return
+        for begin in range(0, count, MOST_POSES):
+            some = slice(begin, begin + MOST_POSES)
+            terms = [term.only(some) for term in self.terms]
+            gone = None if self.dropped is None else [rows[some] for rows in self.dropped]
+            yield replace(self, terms=terms, dropped=gone), at.only(some)
 
     def station_scale(self, at: Point) -> Array:
         """Typical sizes of the unknowns of a pose that move."""
@@ -123,18 +142,20 @@ class LeastSquares:
     def evaluate(self, at: Point) -> tuple[Array, Array, Array]:
         """All residuals, shape (k, rows), and derivatives in typical sizes."""
         parts = [list(term.evaluate(at)) for term in self.terms]
+        for part in parts:
+            part[1] = part[1][:, :, self.free]
         for part, gone in zip(parts, self.dropped or (), strict=False):
             part[0] = np.where(gone, 0.0, part[0])
             part[1] = np.where(gone[:, :, None], 0.0, part[1])
             part[2] = np.where(gone[:, :, None], 0.0, part[2])
         r = np.concatenate([part[0] for part in parts], axis=1)
-        A = np.concatenate([part[1][:, :, self.free] for part in parts], axis=1)
+        A = np.concatenate([part[1] for part in parts], axis=1)
         B = self.freedom.narrow(np.concatenate([part[2] for part in parts], axis=1), at.stations.R)
         return r, A * at.layout.typical[self.free], B * self.station_scale(at)
 
     def cost(self, at: Point) -> float:
         """Half the sum of squares, of Huber's function and of the prior."""
-        parts = [term.evaluate(at)[0] for term in self.terms]
+        parts = [term.by_poses(at)[0] for term in self.terms]
         for k, gone in enumerate(self.dropped or ()):
             parts[k] = np.where(gone, 0.0, parts[k])
         r = np.abs(np.concatenate(parts, axis=1))
@@ -145,19 +166,21 @@ class LeastSquares:
         total += 0.5 * float(prior @ prior)
         return total if np.isfinite(total) else np.inf
 
-    def _undetermined(self, pose: int) -> str:
-        """That nothing determines a pose, in words; or nothing that fits."""
+    def _undetermined(self, pose: int, first: int) -> str:
+        """That nothing determines a pose, in words; or nothing that fits.
+
+        Args:
+            pose: Number of it among these poses.
+            first: Number of their first one.
+        """
+        where = f"pose {first + pose + 1}: what was measured there does not determine where"
         gone = sum(int(np.sum(rows[pose])) for rows in self.dropped or ())
         if not gone:
-            return (
-                f"pose {pose + 1}: what was measured there does not determine where the platform "
-                "is; accepted: more measurements at it, or none of it"
-            )
+            return f"{where} the platform is; accepted: more measurements at it, or none of it"
         whole = sum(int(np.sum(term.measured()[pose])) for term in self.terms)
         return (
-            f"pose {pose + 1}: what was measured there does not determine where the platform is "
-            f"without the {gone} of {whole} readings that do not fit; accepted: readings that "
-            "agree, or another start"
+            f"{where} the platform is without the {gone} of {whole} readings that do "
+            "not fit; accepted: readings that agree, or another start"
         )
 
     def normal_equations(self, at: Point, damping: float, robust: bool = True) -> NormalEquations:
@@ -165,6 +188,32 @@ class LeastSquares:
 
         Raises:
             CalibrationError: Nothing determines a pose; names it.
+        """
+        parts = [
+            part._of_block(there, damping, robust, k * MOST_POSES)
+            for k, (part, there) in enumerate(self.blocks(at))
+        ]
+        S, rhs = (sum(part[i] for part in parts[1:]) + parts[0][i] for i in (0, 1))
+        back, alone, H = (
+            parts[0][i] if len(parts) == 1 else np.concatenate([part[i] for part in parts])
+            for i in (2, 3, 4)
+        )
+        typical = at.layout.typical[self.free]
+        prior, P = self.prior.evaluate(at, self.free)
+        P = P * typical
+        S = 0.5 * (S + S.T)
+        return NormalEquations(S + P.T @ P, S, rhs - P.T @ prior, back, alone, H)
+
+    def _of_block(
+        self, at: Point, damping: float, robust: bool, first: int
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """What some poses add to S_data and rhs, and back, alone and H of them.
+
+        Args:
+            at: The model and these poses.
+            damping: Of the steps.
+            robust: True if residuals beyond `huber` count linearly.
+            first: Number of the first of them, for messages.
         """
         r, A, B = self.evaluate(at)
         if robust and np.isfinite(self.huber):
@@ -178,19 +227,13 @@ class LeastSquares:
             spread = np.linalg.eigvalsh(H)
             bad = spread[:, 0] <= SINGULAR * spread[:, -1]
             if bad.any():
-                raise CalibrationError(self._undetermined(int(np.argmax(bad))))
+                raise CalibrationError(self._undetermined(int(np.argmax(bad)), first))
         damped = H + damping * np.eye(H.shape[1])
         solved = np.linalg.solve(damped, np.concatenate([C, g], axis=2))
         back, alone = solved[:, :, :-1], solved[:, :, -1]
-        count = A.shape[2]
-        flat = A.reshape(r.size, count)
+        flat = A.reshape(r.size, A.shape[2])
         S = flat.T @ flat - np.einsum("kqf,kqh->fh", C, back)
-        rhs = -(flat.T @ r.ravel() - np.einsum("kqf,kq->f", C, alone))
-        typical = at.layout.typical[self.free]
-        prior, P = self.prior.evaluate(at, self.free)
-        P = P * typical
-        S = 0.5 * (S + S.T)
-        return NormalEquations(S + P.T @ P, S, rhs - P.T @ prior, back, alone, H)
+        return S, -(flat.T @ r.ravel() - np.einsum("kqf,kq->f", C, alone)), back, alone, H
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,6 +38,9 @@ HUBER = 3.0
 SETTLED = 1e-8
 """By how much half the sum of squares of a pose may still fall."""
 
+MOST_AT_ONCE = 4000
+"""Searches that are in memory at a time."""
+
 MOST_STEPS = 100
 ROUNDING = 1e-12
 FIRST_DAMPING, SMALLEST_DAMPING, LARGEST_DAMPING = 1e-4, 1e-10, 1e10
@@ -82,7 +85,7 @@ class FoundPoses:
 
 def robust_costs(terms: Sequence[Term], at: Point) -> Array:
     """What measurements at each pose cost, shape (k,): squares over sigma, 16 for each outlier."""
-    parts = [2.0 * np.sum(truncated(term.evaluate(at)[0])[0], axis=1) for term in terms]
+    parts = [2.0 * np.sum(truncated(term.by_poses(at)[0])[0], axis=1) for term in terms]
     return np.asarray(np.sum(parts, axis=0))
 
 
@@ -149,9 +152,8 @@ def settle_poses(
 def _evaluated(
     terms: Sequence[Term], at: Point, counts: npt.NDArray[np.bool_] | None
 ) -> tuple[Array, Array]:
-    parts = [term.evaluate(at) for term in terms]
-    r = np.concatenate([part[0] for part in parts], axis=1)
-    B = np.concatenate([part[2] for part in parts], axis=1)
+    parts = [term.by_poses(at) for term in terms]
+    r, B = (np.concatenate([part[i] for part in parts], axis=1) for i in (0, 1))
     return (r, B) if counts is None else (np.where(counts, r, 0.0), B * counts[:, :, None])
 
 
@@ -175,6 +177,16 @@ def robust_poses(
         without: Residuals that do not count on the way there, shape (k, rows): a bad one may lead
             into a wrong minimum, though it is an outlier there, too.
     """
+    count = at.stations.count
+    if count > MOST_AT_ONCE:
+        parts = [slice(k, k + MOST_AT_ONCE) for k in range(0, count, MOST_AT_ONCE)]
+        return _joined([
+            robust_poses(
+                [term.only(some) for term in terms], at.only(some), freedom=freedom,
+                outliers=outliers, without=None if without is None else without[some],
+            )
+            for some in parts
+        ])  # fmt: skip
     if not outliers:
         found = settle_poses(terms, at, squares, freedom=freedom, without=without)
         return FoundPoses(found.stations, 2.0 * found.costs)

@@ -2,7 +2,7 @@
 
 What is learnt are exit points, anchor points and where winches began to count. What an image of a
 tag that rests and the lengths at the same instant tell is a station, with residuals and derivatives
-of `terms` and `onboard_terms`; its pose is eliminated. The stations of a window are linearised
+of `terms` and `sensor_terms`; its pose is eliminated. The stations of a window are linearised
 anew with each that comes, and the oldest goes, as it is linearised then, into an information
 matrix that stays: beyond the window this is the extended information filter, which is then too
 sure of itself, as what is linearised at an early estimate tells of directions that nothing excites.
@@ -34,15 +34,15 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.calibration.elimination import LeastSquares, Prior
 from cdpr_drake.calibration.identifiability import frame_motions
-from cdpr_drake.calibration.onboard_terms import TagCorners
 from cdpr_drake.calibration.parameters import (
     CalibrationModel,
     model_difference,
     moved_model,
     parameter_layout,
 )
+from cdpr_drake.calibration.sensor_terms import TagCorners, TrackedPoses
 from cdpr_drake.calibration.stations import Point, Stations
-from cdpr_drake.calibration.terms import Lengths, TrackedPoses
+from cdpr_drake.calibration.terms import Lengths
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import place_error, pose_error, pose_from_row, pose_row

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +31,9 @@ SLOW, FAST = 0.03, 95.0
 
 CERTAIN, STEADY = 4.0, 3.0
 """Largest rate and scatter at rest, in those that noise makes."""
+
+NEAR = 1.5
+"""Distance of a row from the median of its group, in scatters that are rest."""
 
 QUIETEST = 10.0
 """Percentile of the windows' scatter that tells the noise."""
@@ -121,7 +125,7 @@ def _groups(time: Array, tables: list[Array], forces: Array) -> tuple[list[slice
         loose = np.maximum(STEADY * noise, most * (t[:, -1] - t[:, 0]) / np.sqrt(12.0))
         slow &= rates <= most
         steady &= scatter <= loose
-        limits.append(float(np.median(loose)))
+        limits.append(NEAR * float(np.median(loose)))
     quiet = slow & steady
     if quiet.any() and forces.shape[1]:
         scatter = _lines(t, forces)[1]
@@ -139,21 +143,28 @@ def _groups(time: Array, tables: list[Array], forces: Array) -> tuple[list[slice
     groups = [
         part
         for first, stop in ends.reshape(-1, 2)
-        for part in _split(slice(int(first) - 1, int(stop)), tables, limits, size - 2 * edge)
+        for part in _split(slice(int(first) - 1, int(stop)), tables, limits, size)
     ]
     return groups, unmoved, is_motion
 
 
 def _split(group: slice, tables: list[Array], limits: list[float], least: int) -> list[slice]:
-    """A group, or parts of it of some rows at least, in which no table exceeds its limit."""
-    if group.stop - group.start < least:
+    """Parts of a group of some rows at least, in which every row is near the median."""
+    count = group.stop - group.start
+    if count < least:
         return []
-    pairs = zip(tables, limits, strict=True)
-    if all(np.max(np.std(table[group], axis=0)) <= limit for table, limit in pairs):
+    near = np.ones(count, bool)
+    for table, limit in zip(tables, limits, strict=True):
+        rows = table[group]
+        near &= np.all(np.abs(rows - np.median(rows, axis=0)) <= limit, axis=1)
+    if near.all():
         return [group]
-    middle = (group.start + group.stop) // 2
-    halves = slice(group.start, middle), slice(middle, group.stop)
-    return [part for half in halves for part in _split(half, tables, limits, least)]
+    runs = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
+    if not len(runs):
+        return []
+    begin, end = max(runs.reshape(-1, 2).tolist(), key=lambda run: run[1] - run[0])
+    cuts = [group.start, group.start + begin, group.start + end, group.stop]
+    return [part for a, b in pairwise(cuts) for part in _split(slice(a, b), tables, limits, least)]
 
 
 def _lines(t: Array, table: Array) -> tuple[Array, Array]:

@@ -228,7 +228,7 @@ def make_result(
     surplus = np.full(at.stations.count, -problem.freedom.count(at.stations.width))
     for k, term in enumerate(problem.terms):
         counts = used_rows(problem, k)
-        whole = np.where(counts, term.evaluate(at)[0], np.nan)
+        whole = np.where(counts, term.by_poses(at)[0], np.nan)
         number = np.sum(counts, axis=1)
         surplus += number
         by_row[term.kind] = np.sqrt(np.nansum(whole**2, axis=1) / np.where(number, number, np.nan))
@@ -252,7 +252,7 @@ def make_result(
         loose=loose_frames(equations.S_data, at, free, used),
         frames=frames, twists=twists, prior_only=by_data.untold,
         outliers=() if problem.dropped is None else tuple(find_outliers(problem, at)),
-        largest=tuple(find_outliers(problem, at, 0.0)[:MOST_LARGEST]),
+        largest=tuple(find_outliers(problem, at, 0.0, MOST_LARGEST)),
         robust_cost=robust_cost(problem, at),
         chi_square=squares + float(prior @ prior), degrees=rows + known - unknown,
         steps=found.steps, seconds=seconds, by_row=by_row, surplus=surplus,
@@ -280,25 +280,35 @@ def used_rows(problem: LeastSquares, k: int) -> npt.NDArray[np.bool_]:
     return measured if problem.dropped is None else measured & ~problem.dropped[k]
 
 
-def find_outliers(problem: LeastSquares, at: Point, least: float = OUTLIER) -> list[Outlier]:
-    """Measurements with residuals of more than so many sigmas, dropped ones too; largest first."""
+def find_outliers(
+    problem: LeastSquares, at: Point, least: float = OUTLIER, most: int | None = None
+) -> list[Outlier]:
+    """Measurements with residuals of more than so many sigmas, dropped ones too; largest first, and
+    so many at most."""
+    places: list[tuple[int, int, int]] = []
+    sizes: list[Array] = [np.zeros(0)]
+    for k, term in enumerate(problem.terms):
+        r = term.by_poses(at)[0]
+        rows = np.argwhere(term.measured() & (np.abs(r) > least))
+        places += [(k, int(pose), int(row)) for pose, row in rows]
+        sizes.append(r[tuple(rows.T)])
+    r = np.concatenate(sizes)
     outliers = []
-    for term in problem.terms:
-        r, sigma = term.evaluate(at)[0], term.sigmas()
-        for pose, row in np.argwhere(term.measured() & (np.abs(r) > least)):
-            size, row = float(r[pose, row]), int(row)
-            outliers.append(
-                Outlier(
-                    int(pose), term.row_name(row, at.model.names), size * float(sigma[pose, row]),
-                    size, term.kind, term.row_unit(row),
-                )
-            )  # fmt: skip
-    return sorted(outliers, key=lambda one: -abs(one.sigmas))
+    for n in np.argsort(-np.abs(r), kind="stable")[:most]:
+        (k, pose, row), size = places[n], float(r[n])
+        term = problem.terms[k]
+        outliers.append(
+            Outlier(
+                pose, term.row_name(row, at.model.names), size * float(term.sigmas()[pose, row]),
+                size, term.kind, term.row_unit(row),
+            )
+        )  # fmt: skip
+    return outliers
 
 
 def outlying_rows(problem: LeastSquares, at: Point) -> list[npt.NDArray[np.bool_]]:
     """Rows of each term that do not fit, each shape (k, rows)."""
-    return [np.abs(term.evaluate(at)[0]) > OUTLIER for term in problem.terms]
+    return [np.abs(term.by_poses(at)[0]) > OUTLIER for term in problem.terms]
 
 
 def robust_cost(problem: LeastSquares, at: Point) -> float:

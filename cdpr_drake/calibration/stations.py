@@ -111,10 +111,13 @@ class Point:
         """One of the vectors of each cable at each pose, shape (k, m, 3)."""
         return self.vectors[:, :, begin : begin + 3]
 
-    def blank(self, rows: int) -> tuple[Array, Array]:
-        """Zero derivatives by parameters, shape (k, rows, n), and by stations, (k, rows, width)."""
-        k = self.stations.count
-        return np.zeros((k, rows, self.layout.size)), np.zeros((k, rows, self.stations.width))
+    def blank(self, rows: int) -> Array:
+        """Zero derivatives by stations, shape (k, rows, width)."""
+        return np.zeros((self.stations.count, rows, self.stations.width))
+
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Point:
+        """The model and some of the poses."""
+        return Point(self.model, self.stations.only(which), self.layout)
 
     def moved(self, step: Array, steps: Array) -> Point:
         """After a step of all parameters, shape (n,), and of all stations, shape (k, width)."""

@@ -1,8 +1,8 @@
 """What was measured at poses, as residuals with derivatives: (model - measurement) / sigma.
 
-A number that is NaN was not measured. A term evaluates to residuals, shape (k, rows), and their
-derivatives by all parameters, shape (k, rows, n), and by what is unknown of its pose, shape
-(k, rows, width); poses turn and move as in `stations.POSE`.
+Here are the base of all terms, what winches and their cables measure, and balance at rest; other
+sensors are in `sensor_terms`. A number that is NaN was not measured. Poses turn and move as in
+`stations.POSE`.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
+from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel
@@ -25,53 +27,91 @@ from cdpr_drake.calibration.station_kernel import (
     SWIVEL_ANGLE,
     U,
 )
-from cdpr_drake.calibration.stations import POSE, Point, crosses, inverse_turn_slope, turn_vectors
+from cdpr_drake.calibration.stations import POSE, Point, Stations, crosses
+from cdpr_drake.geometry.motion_type import MotionType
+from cdpr_drake.winches.drum import Drum
 
 Evaluated = tuple[Array, Array, Array]
 
+Slopes = list[tuple[Any, Any, Any]]
+"""Rows and columns of derivatives by parameters, and the values there at each pose."""
+
+EVERY_ROW = slice(None)
+
 
 class Term(ABC):
-    """Measurements of one kind at all poses.
+    """Measurements of one kind at all poses, k poses of so many rows.
 
     Attributes:
         kind: What they are.
-        unit: Of a residual times its sigma.
+        unit: Of a residual times its sigma; of two units the first is of the first three rows.
+        by_pose: Fields that have a row for each pose.
+        readings: What was measured; terms without it say themselves what counts.
+        sigma: Standard deviation, or one for each reading, in the unit.
     """
 
     kind: str
     unit: str
+    by_pose: ClassVar[tuple[str, ...]] = ("readings",)
+    readings: Array
+    sigma: Any
 
     @abstractmethod
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+        """Residuals in the unit, shape (k, rows), and their derivatives by what is unknown of each
+        pose, shape (k, rows, width), and by parameters."""
+
     def evaluate(self, at: Point) -> Evaluated:
-        """Residuals over their sigmas and derivatives; zero where nothing was measured."""
+        """Residuals over their sigmas, shape (k, rows), zero where nothing was measured, and their
+        derivatives by all parameters, (k, rows, n), and by each pose, (k, rows, width)."""
+        residual, B, slopes = self.parts(at)
+        A = np.zeros((*residual.shape, at.layout.size))
+        for rows, columns, values in slopes:
+            A[:, rows, columns] = values
+        weight = self.weights()
+        return self._weighted(residual, weight), A * weight[:, :, None], B * weight[:, :, None]
 
-    @abstractmethod
+    def by_poses(self, at: Point) -> tuple[Array, Array]:
+        """As `evaluate`, without derivatives by parameters."""
+        residual, B, _ = self.parts(at)
+        weight = self.weights()
+        return self._weighted(residual, weight), B * weight[:, :, None]
+
+    def weights(self) -> Array:
+        """One over sigma, zero where nothing was measured, shape (k, rows)."""
+        return np.where(self.measured(), 1.0 / self.sigmas(), 0.0)
+
+    def _weighted(self, residual: Array, weight: Array) -> Array:
+        return np.where(self.measured(), residual, 0.0) * weight
+
     def measured(self) -> npt.NDArray[np.bool_]:
-        """Which rows count, shape (k, rows), as True and False."""
+        """Which rows count, shape (k, rows)."""
+        return np.isfinite(self.readings)
 
-    @abstractmethod
     def sigmas(self) -> Array:
-        """Standard deviations, shape (k, rows), in the units."""
+        """Standard deviations, shape (k, rows), in the unit."""
+        return np.broadcast_to(self.sigma, self.measured().shape)
 
     @abstractmethod
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """What a row is, in words; with the names of the cables."""
 
     def row_unit(self, row: int) -> str:
-        """Unit of a row: where there are two, the first half has the first."""
+        """Unit of a row."""
         units = self.unit.split(", ")
         return units[0] if len(units) == 1 or row < 3 else units[1]
 
-    @abstractmethod
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Self:
         """The measurements at some of the poses."""
+        some: dict[str, Any] = {name: getattr(self, name)[which] for name in self.by_pose}
+        return replace(self, **some)  # type: ignore[type-var]
 
     def values(self, at: Point) -> Array:
-        """What was measured, in the units, shape (k, rows): what a wrong factor multiplies.
+        """What was measured, in the unit, shape (k, rows): what a wrong factor multiplies.
 
         Zero where a factor means nothing, as of forces that should be in balance.
         """
-        return np.zeros(self.measured().shape)
+        return self.readings
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Term:
         """What has the same residuals by `base`, which counts from nothing, as this by a model of
@@ -79,17 +119,30 @@ class Term(ABC):
         return self
 
 
-def weighted(
-    residual: Array, A: Array, B: Array, sigma: Array, valid: npt.NDArray[np.bool_]
-) -> Evaluated:
-    """Over sigma, and zero where it was not measured."""
-    weight = np.where(valid, 1.0 / sigma, 0.0)
-    residual = np.where(valid, residual, 0.0) * weight
-    return residual, A * weight[:, :, None], B * weight[:, :, None]
+class CableTerm(Term):
+    """Measurements of one number a cable."""
+
+    word: str
+
+    def row_name(self, row: int, names: tuple[str, ...]) -> str:
+        """As the base class says."""
+        return f"{self.word} of {names[row]}"
+
+
+def _three(at: Point, group: str) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Rows, one a cable, and columns of the points of all cables in a group, shape (m, 3)."""
+    i = np.arange(at.model.cables.count)[:, None]
+    return i, at.layout.slices[group].start + 3 * i + np.arange(3)
+
+
+def _own(at: Point, group: str) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Rows, one a cable, and columns of the numbers of all cables in a group, shape (m,)."""
+    i = np.arange(at.model.cables.count)
+    return i, at.layout.slices[group].start + i
 
 
 @dataclass(eq=False)
-class Lengths(Term):
+class Lengths(CableTerm):
     """Cable lengths that winches counted, from a reading each where counting began.
 
     A reading is model = start + (length / (1 + strain) - start - offset) / scale.
@@ -107,48 +160,26 @@ class Lengths(Term):
     strain: Array
     kind = "lengths"
     unit = "m"
+    word = "length"
+    by_pose = ("readings", "sigma", "strain")
 
-    def evaluate(self, at: Point) -> Evaluated:
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
         """As the base class says."""
-        model, where = at.model, at.layout.slices
-        m = self.readings.shape[1]
-        per_length = 1.0 / (1.0 + self.strain)
-        scale = model.length_scale
-        counted = at.numbers[:, :, LENGTH] * per_length - self.start - model.length_offset
-        residual = self.start + counted / scale - self.readings
-        A, B = at.blank(m)
-        i = np.arange(m)
+        scale, per_length = at.model.length_scale, 1.0 / (1.0 + self.strain)
+        counted = at.numbers[:, :, LENGTH] * per_length - self.start - at.model.length_offset
         u, slope = at.vector(U), per_length / scale
-        three = 3 * i[:, None] + np.arange(3)
-        A[:, i[:, None], where["exit_points"].start + three] = -u * slope[:, :, None]
         u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
-        A[:, i[:, None], where["anchor_points"].start + three] = u_P * slope[:, :, None]
-        A[:, i, where["length_offsets"].start + i] = -1.0 / scale
-        A[:, i, where["length_scales"].start + i] = -counted / scale**2
-        A[:, i, where["pulley_radii"].start + i] = at.numbers[:, :, RADIUS_SLOPE] * slope
+        slopes: Slopes = [
+            (*_three(at, "exit_points"), -u * slope[:, :, None]),
+            (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
+            (*_own(at, "length_offsets"), -1.0 / scale),
+            (*_own(at, "length_scales"), -counted / scale**2),
+            (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
+        ]
+        B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
-        return weighted(residual, A, B, self.sigma, self.measured())
-
-    def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
-        return np.isfinite(self.readings)
-
-    def sigmas(self) -> Array:
-        """As the base class says."""
-        return self.sigma
-
-    def values(self, at: Point) -> Array:
-        """As the base class says."""
-        return self.readings
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"length of {names[row]}"
-
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
-        """As the base class says."""
-        return Lengths(self.readings[which], self.sigma[which], self.start, self.strain[which])
+        return self.start + counted / scale - self.readings, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Lengths:
         """As the base class says."""
@@ -157,7 +188,102 @@ class Lengths(Term):
 
 
 @dataclass(eq=False)
-class Swivels(Term):
+class ZeroedCables(Term):
+    """What was paid out since winches stood at zero: cable lengths, or what motor angles say.
+
+    Winches stood at zero at a pose that is known, where cables were as long as the model says
+    there, and by `length_offset` longer; without such a pose `length_offset` is the whole length
+    at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out. What a
+    motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square of the
+    radius at which line leaves falls in proportion to what is paid out, as in firmware of
+    Hangprinters.
+
+    Attributes:
+        readings: Lengths [m] or, with a drum, motor angles [rad], positive pays out, shape (k, m).
+        sigma: Standard deviations of the lengths, shape (k, m) [m].
+        zero: Pose X_WP at which winches stood at zero [m]; None: not known.
+        drum: The drums as they are believed; None: readings are lengths.
+        strain: By how much a cable is longer than counted, shape (k, m) [-].
+        added: What offsets are besides those of the model, shape (k, m) [m]; see `counted_by`.
+        advantage: Parts of line side by side, shape (m,), or 1: over it the radii of `drum` are
+            those of the drums themselves [-].
+
+    Source: Ljungstroem, auto-calibration-simulation-for-hangprinter, simulation.py, 2023,
+    `motor_pos_samples_to_distances_relative_to_origin`, for lengths by motor angles.
+    """
+
+    readings: Array
+    sigma: Array
+    zero: RigidTransform | None
+    drum: Drum | None
+    strain: Array
+    added: Array
+    advantage: Array | float = 1.0
+    unit = "m"
+    by_pose = ("readings", "sigma", "strain", "added")
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """What they are."""
+        return "lengths" if self.drum is None else "motor angles"
+
+    def paid_out(self, model: CalibrationModel) -> tuple[Array, Array]:
+        """Cable that left the drums, shape (k, m) [m], and how it grows with their radii [-]."""
+        if self.drum is None:
+            return self.readings, np.zeros(self.readings.shape)
+        grown = (model.drum_radius + model.common_drum_radius) / self.advantage
+        drum = replace(self.drum, radius=self.drum.radius + grown)
+        return drum.paid_out(self.readings), drum.per_radius(self.readings) / self.advantage
+
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+        """As the base class says."""
+        model, slope = at.model, 1.0 / (1.0 + self.strain)
+        paid, by_radius = self.paid_out(model)
+        scale, u = model.length_scale, at.vector(U)
+        residual = at.numbers[:, :, LENGTH] * slope - model.length_offset - scale * paid
+        residual = residual - self.added
+        exits = -u * slope[:, :, None]
+        anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
+        radii = at.numbers[:, :, RADIUS_SLOPE] * slope
+        if self.zero is not None:
+            home = Point(model, Stations.at([self.zero]), at.layout)
+            v = home.vector(U)[0]
+            residual = residual - home.numbers[0, :, LENGTH]
+            exits, anchors = exits + v, anchors - v @ home.stations.R[0]
+            radii = radii - home.numbers[0, :, RADIUS_SLOPE]
+        slopes: Slopes = [
+            (*_three(at, "exit_points"), exits),
+            (*_three(at, "anchor_points"), anchors),
+            (*_own(at, "pulley_radii"), radii),
+            (*_own(at, "length_offsets"), -1.0),
+            (*_own(at, "length_scales"), -paid),
+            (*_own(at, "drum_radii"), -scale * by_radius),
+            (np.arange(len(scale)), at.layout.slices["common_drum_radius"].start,
+             -scale * by_radius),
+        ]  # fmt: skip
+        B = at.blank(len(scale))
+        B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
+        B[:, :, 3:POSE] = u * slope[:, :, None]
+        return residual, B, slopes
+
+    def values(self, at: Point) -> Array:
+        """As the base class says: cable that was paid out [m]."""
+        return at.model.length_scale * self.paid_out(at.model)[0]
+
+    def row_name(self, row: int, names: tuple[str, ...]) -> str:
+        """As the base class says."""
+        return f"{'length' if self.drum is None else 'motor angle'} of {names[row]}"
+
+    def counted_by(
+        self, models: Sequence[CalibrationModel], base: CalibrationModel
+    ) -> ZeroedCables:
+        """As the base class says."""
+        offsets = np.array([model.length_offset for model in models])
+        return replace(self, added=self.added + offsets)
+
+
+@dataclass(eq=False)
+class Swivels(CableTerm):
     """Angles of pulleys about their swivel axes: reading = angle - zero.
 
     Attributes:
@@ -169,42 +295,21 @@ class Swivels(Term):
     sigma: float
     kind = "swivel angles"
     unit = "rad"
+    word = "swivel angle"
 
-    def evaluate(self, at: Point) -> Evaluated:
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
         """As the base class says."""
-        where, m = at.layout.slices, self.readings.shape[1]
         residual = at.numbers[:, :, SWIVEL_ANGLE] - at.model.swivel_offset - self.readings
         residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
-        A, B = at.blank(m)
-        i, g = np.arange(m), at.vector(ACROSS)
-        three = 3 * i[:, None] + np.arange(3)
-        A[:, i[:, None], where["exit_points"].start + three] = -g
-        A[:, i[:, None], where["anchor_points"].start + three] = np.einsum(
-            "kba,kmb->kma", at.stations.R, g
-        )
-        A[:, i, where["swivel_offsets"].start + i] = -1.0
+        g = at.vector(ACROSS)
+        slopes: Slopes = [
+            (*_three(at, "exit_points"), -g),
+            (*_three(at, "anchor_points"), np.einsum("kba,kmb->kma", at.stations.R, g)),
+            (*_own(at, "swivel_offsets"), -1.0),
+        ]
+        B = at.blank(g.shape[1])
         B[:, :, :3], B[:, :, 3:POSE] = np.cross(at.vector(ARM), g), g
-        return weighted(residual, A, B, self.sigmas(), self.measured())
-
-    def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
-        return np.isfinite(self.readings)
-
-    def sigmas(self) -> Array:
-        """As the base class says."""
-        return np.full(self.readings.shape, self.sigma)
-
-    def values(self, at: Point) -> Array:
-        """As the base class says."""
-        return self.readings
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"swivel angle of {names[row]}"
-
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
-        """As the base class says."""
-        return Swivels(self.readings[which], self.sigma)
+        return residual, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Swivels:
         """As the base class says."""
@@ -213,75 +318,7 @@ class Swivels(Term):
 
 
 @dataclass(eq=False)
-class TrackedPoses(Term):
-    """Poses X_KM of a marker on the platform that a tracker measured in its frame.
-
-    Attributes:
-        R: Rotations in K, shape (k, 3, 3); NaN where none was measured.
-        p: Positions in K, shape (k, 3) [m].
-        sigma_turn: Standard deviation of a rotation about each axis [rad].
-        sigma_place: Of a coordinate of the position [m].
-    """
-
-    R: Array
-    p: Array
-    sigma_turn: float
-    sigma_place: float
-    kind = "tracked poses"
-    unit = "rad, m"
-
-    def evaluate(self, at: Point) -> Evaluated:
-        """As the base class says."""
-        seen = self.measured()
-        k = len(self.p)
-        X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
-        R_WK = X_WK.rotation().matrix()
-        R = R_WK @ np.where(seen[:, :1, None], self.R, np.eye(3))
-        p = np.where(seen[:, :3], self.p, 0.0) @ R_WK.T
-        lever = R_WP @ X_PM.translation()
-        turns = turn_vectors(R_WP @ X_PM.rotation().matrix() @ np.swapaxes(R, 1, 2))
-        residual = np.hstack([turns, at.stations.p + lever - p - X_WK.translation()])
-        A, B = at.blank(6)
-        slope = inverse_turn_slope(turns)
-        B[:, :3, :3], B[:, 3:, :3] = slope, -crosses(lever)
-        B[:, 3:, 3:POSE] = np.broadcast_to(np.eye(3), (k, 3, 3))
-        begin = at.layout.slices["tracker"].start
-        # exp(w) R_WK stands transposed and last in the turn: its slope is that of minus the turn.
-        A[:, :3, begin : begin + 3] = -inverse_turn_slope(-turns)
-        A[:, 3:, begin : begin + 3] = crosses(p)
-        A[:, 3:, begin + 3 : begin + 6] = -np.eye(3)
-        begin = at.layout.slices["marker"].start
-        A[:, :3, begin : begin + 3] = slope @ R_WP
-        A[:, 3:, begin + 3 : begin + 6] = R_WP
-        return weighted(residual, A, B, self.sigmas(), seen)
-
-    def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
-        whole = np.all(np.isfinite(self.p), axis=1) & np.all(np.isfinite(self.R), axis=(1, 2))
-        return np.repeat(np.asarray(whole)[:, None], 6, axis=1)
-
-    def sigmas(self) -> Array:
-        """As the base class says."""
-        return np.tile([self.sigma_turn] * 3 + [self.sigma_place] * 3, (len(self.p), 1))
-
-    def values(self, at: Point) -> Array:
-        """As the base class says; along the axes of W."""
-        seen = self.measured()
-        turns = turn_vectors(np.where(seen[:, :1, None], self.R, np.eye(3)))
-        R_WK = at.model.X_WK.rotation().matrix()
-        return np.hstack([turns @ R_WK.T, self.p @ R_WK.T])
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tracker, {('turn', 'place')[row // 3]} {'xyz'[row % 3]}"
-
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
-        """As the base class says."""
-        return replace(self, R=self.R[which], p=self.p[which])
-
-
-@dataclass(eq=False)
-class Tensions(Term):
+class Tensions(CableTerm):
     """Tensions that sensors measured.
 
     Attributes:
@@ -293,39 +330,24 @@ class Tensions(Term):
     sigma: Array
     kind = "tensions"
     unit = "N"
+    word = "tension"
+    by_pose = ("readings", "sigma")
 
-    def evaluate(self, at: Point) -> Evaluated:
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
         """As the base class says."""
         assert at.stations.tensions is not None
         m = self.readings.shape[1]
-        A, B = at.blank(m)
+        B = at.blank(m)
         B[:, np.arange(m), POSE + np.arange(m)] = 1.0
-        return weighted(at.stations.tensions - self.readings, A, B, self.sigma, self.measured())
-
-    def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
-        return np.isfinite(self.readings)
-
-    def sigmas(self) -> Array:
-        """As the base class says."""
-        return self.sigma
-
-    def values(self, at: Point) -> Array:
-        """As the base class says."""
-        return self.readings
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tension of {names[row]}"
-
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
-        """As the base class says."""
-        return Tensions(self.readings[which], self.sigma[which])
+        return at.stations.tensions - self.readings, B, []
 
 
 @dataclass(eq=False)
 class EquilibriumTerm(Term):
     """The platform rests: tensions and weight balance up to what is not modelled.
+
+    Of a platform that moves less than a body in space they balance along the motions that it has:
+    what it cannot move something else holds, so forces and moments there do not count.
 
     Attributes:
         count: Number of poses k.
@@ -333,6 +355,7 @@ class EquilibriumTerm(Term):
         p_PPcm: Centre of mass, shape (3,) [m].
         sigma_moment: What moments about Po may miss [N m].
         sigma_force: What forces may miss [N].
+        motion: Motion type of a platform that moves less; None: a body in space.
     """
 
     count: int
@@ -340,11 +363,12 @@ class EquilibriumTerm(Term):
     p_PPcm: Array
     sigma_moment: float
     sigma_force: float
+    motion: MotionType | None = None
     kind = "equilibrium"
     unit = "N m, N"
 
-    def evaluate(self, at: Point) -> Evaluated:
-        """As the base class says."""
+    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+        """As the base class says, of a body in space, in each of six rows."""
         t = at.stations.tensions
         assert t is not None
         where, m = at.layout.slices, t.shape[1]
@@ -355,7 +379,6 @@ class EquilibriumTerm(Term):
         residual = -np.einsum("kmi,km->ki", J, t)
         residual[:, :3] += np.cross(lever, f)
         residual[:, 3:] += f
-        A, B = at.blank(6)
         armx, ux = crosses(arm), crosses(u)
         # A step of B turns u by H; one of the arm changes the moment besides.
         by_point = np.concatenate([armx @ H, H], axis=2)  # (k, m, 6, 3)
@@ -364,30 +387,78 @@ class EquilibriumTerm(Term):
         minus_t = -t[:, :, None, None]
         exits = -minus_t * by_point
         anchors = minus_t * (by_arm @ at.stations.R[:, None])
-        A[:, :, where["exit_points"]] = np.moveaxis(exits, 1, 2).reshape(-1, 6, 3 * m)
-        A[:, :, where["anchor_points"]] = np.moveaxis(anchors, 1, 2).reshape(-1, 6, 3 * m)
         bend = at.vector(BEND)
         bent = np.concatenate([np.cross(arm, bend), bend], axis=2) * -t[:, :, None]
-        A[:, :, where["pulley_radii"]] = np.moveaxis(bent, 1, 2)
+        slopes: Slopes = [
+            (EVERY_ROW, where["exit_points"], np.moveaxis(exits, 1, 2).reshape(-1, 6, 3 * m)),
+            (EVERY_ROW, where["anchor_points"], np.moveaxis(anchors, 1, 2).reshape(-1, 6, 3 * m)),
+            (EVERY_ROW, where["pulley_radii"], np.moveaxis(bent, 1, 2)),
+        ]
+        B = at.blank(6)
         B[:, :, :3] = np.sum(minus_t * (by_arm @ -armx), axis=1)
         B[:, :3, :3] += crosses(f) @ crosses(lever)
         B[:, :, 3:POSE] = np.sum(minus_t * by_point, axis=1)
         B[:, :, POSE:] = -np.moveaxis(J, 1, 2)
-        sigma = np.tile([self.sigma_moment] * 3 + [self.sigma_force] * 3, (self.count, 1))
-        return weighted(residual, A, B, sigma, np.ones((self.count, 6), dtype=bool))
+        return residual, B, slopes
+
+    def weights(self) -> Array:
+        """As the base class says, of a body in space."""
+        return 1.0 / np.tile([self.sigma_moment] * 3 + [self.sigma_force] * 3, (self.count, 1))
+
+    def _weighted(self, residual: Array, weight: Array) -> Array:
+        return residual * weight
+
+    def evaluate(self, at: Point) -> Evaluated:
+        """As the base class says; moments and forces have one sigma each, which bases keep."""
+        r, A, B = super().evaluate(at)
+        if self.motion is None:
+            return r, A, B
+        bases = self._bases(at)
+        return (bases @ r[:, :, None])[:, :, 0], bases @ A, bases @ B
+
+    def by_poses(self, at: Point) -> tuple[Array, Array]:
+        """As the base class says."""
+        r, B = super().by_poses(at)
+        if self.motion is None:
+            return r, B
+        bases = self._bases(at)
+        return (bases @ r[:, :, None])[:, :, 0], bases @ B
+
+    def _bases(self, at: Point) -> Array:
+        """Motions at each pose, shape (k, freedom, 6)."""
+        assert self.motion is not None
+        bases = np.array([self.motion.basis(R).T for R in at.stations.R])
+        return bases.reshape(-1, self.motion.freedom, 6)
 
     def measured(self) -> npt.NDArray[np.bool_]:
         """As the base class says."""
-        return np.ones((self.count, 6), dtype=bool)
+        rows = 6 if self.motion is None else self.motion.freedom
+        return np.ones((self.count, rows), dtype=bool)
+
+    def _turns(self) -> int:
+        """Rows of moments, which come first."""
+        return 3 if self.motion is None else self.motion.num_turns
 
     def sigmas(self) -> Array:
         """As the base class says."""
-        return np.tile([self.sigma_moment] * 3 + [self.sigma_force] * 3, (self.count, 1))
+        sigmas = np.full(self.measured().shape, self.sigma_force)
+        sigmas[:, : self._turns()] = self.sigma_moment
+        return sigmas
+
+    def values(self, at: Point) -> Array:
+        """As the base class says."""
+        return np.zeros(self.measured().shape)
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
+        if self.motion is not None:
+            return self.motion.words()[row]
         return f"{('moment', 'force')[row // 3]} along {'xyz'[row % 3]}"
 
-    def only(self, which: npt.NDArray[np.generic] | slice) -> Term:
+    def row_unit(self, row: int) -> str:
+        """As the base class says."""
+        return "N m" if row < self._turns() else "N"
+
+    def only(self, which: npt.NDArray[np.generic] | slice) -> EquilibriumTerm:
         """As the base class says."""
         return replace(self, count=len(np.arange(self.count)[which]))

@@ -217,10 +217,10 @@ def test_tensions_are_those_of_the_stations():
 def test_tilts_are_roll_pitch_and_yaw():
     at, term = everything().at(), everything().terms[6]
     angles = np.array([RollPitchYaw(X.rotation()).vector() for X in at.stations.poses()])
-    expected = np.where(np.isfinite(term.angles), angles - term.angles, 0.0)
+    expected = np.where(np.isfinite(term.readings), angles - term.readings, 0.0)
     np.testing.assert_allclose(told(term, at), expected, atol=SAME)
     np.testing.assert_array_equal(term.sigmas()[0], [1e-2, 1e-2, 2e-2])
-    round_about = replace(term, angles=term.angles - 2.0 * np.pi)
+    round_about = replace(term, readings=term.readings - 2.0 * np.pi)
     np.testing.assert_allclose(told(round_about, at), expected, atol=SAME)
 
 

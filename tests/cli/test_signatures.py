@@ -42,7 +42,7 @@ ANY_WORD = {
     "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
     "--out", "--parameters", "--path", "--picture", "--poses-from", "--rails", "--reactions",
     "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut", "--unknown",
-    "--workers", "--wrench-set",
+    "--validate", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
@@ -110,8 +110,9 @@ def test_a_docstring_has_a_line_for_each_argument(verb, name):
     assert missing == []
 
 
-SETTINGS = ("DesignSettings", "ProofSettings")
-"""Public classes of settings: the schema of a file, and what `ProvenSets` are made with."""
+SETTINGS = ("CalibrationTask", "DesignSettings", "ProofSettings")
+"""Public classes: a log and its unknowns, which trials of signs and of rows change; the schema of a
+file; what `ProvenSets` are made with."""
 
 CARRIED = 5
 """So many fields of a class may have the name of an option by chance."""

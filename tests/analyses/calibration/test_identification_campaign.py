@@ -70,9 +70,9 @@ def test_the_logs_that_it_leaves_say_the_same(folder):
     log = read_measurements(place / "excitation.csv", [cable.name for cable in believed.cables])
     task = IdentificationTask(
         robot=believed, unknown=run.source.identification.task.unknown, pulleys=False,
-        bandwidth=campaign.BANDWIDTH, sigma_lengths=campaign.SIGMA_LENGTHS,
+        sigma_lengths=campaign.SIGMA_LENGTHS,
     )  # fmt: skip
-    again = fit_dynamics(task, log)
+    again = fit_dynamics(task, log, bandwidth=campaign.BANDWIDTH)
     first = run.result
     assert np.max(np.abs(again.result.values - first.values) / first.std) < 1e-6
 

@@ -121,7 +121,10 @@ def maslow(count=8):
              for k in range(count)]  # fmt: skip
     lines = ["[MSG:INFO: Calibration started]"]
     for rows in (poses[:3], poses):
-        belts = "".join("{bl:%.2f,   br:%.2f,   tr:%.2f,   tl:%.2f}," % tuple(row) for row in rows)
+        belts = "".join(
+            f"{{bl:{bl:.2f},   br:{br:.2f},   tr:{tr:.2f},   tl:{tl:.2f}}},"
+            for bl, br, tr, tl in rows
+        )
         lines += ["$/Maslow_tlX=0.0", f"CLBM:[{belts}]"]
     return "\n".join(lines) + "\n"
 

@@ -151,7 +151,7 @@ def test_columns_without_a_header_need_a_mapping(write):
 
 def test_a_unit_that_nobody_says_is_told_as_assumed(write):
     path = write("log.csv", "time,C1_length\n0,1000\n1,1001\n")
-    assert "since neither header nor --unit" in str(read_log(path).units)
+    assert "since neither header nor user" in str(read_log(path).units)
     log = read_log(path, Facts(units={"length": "mm"}))
     np.testing.assert_allclose(log.frame["C1_length_m"], [1.0, 1.001])
 
@@ -184,7 +184,7 @@ REFUSED = [
     ("take.csv", recorders.motive(), Facts(), "Length Units: found none"),
     ("take.csv", recorders.motive(units="Feet"), Facts(), "Length Units: found Feet"),
     ("take.csv", recorders.motive(bodies=("One", "Two")), TOLD,
-     "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them by --body"),
+     "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them; use body"),
     ("take.csv", recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
     ("log.txt", recorders.gtgraffiti(), Facts(), "time: found no column of times; accep"),
     ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
@@ -299,7 +299,9 @@ def test_a_run_s_own_log_is_read(tmp_path):
 def test_numbers_that_have_no_square_are_refused(number, write):
     text = recorders.columns().replace("2000.250", number, 1)
     assert number in text
-    with pytest.raises(LogFileError, match=r"log.csv:2: C2_length_mm: found .*accepted: a number up"):
+    with pytest.raises(
+        LogFileError, match=r"log.csv:2: C2_length_mm: found .*accepted: a number up"
+    ):
         import_log(write("log.csv", text))
 
 

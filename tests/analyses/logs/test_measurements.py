@@ -3,7 +3,7 @@ import pytest
 
 from cdpr_drake.analyses.fits.tags import read_tags
 from cdpr_drake.analyses.logs.measurements import read_measurements
-from cdpr_drake.errors import CalibrationError
+from cdpr_drake.errors import CalibrationError, LogFileError
 from cdpr_drake.geometry.poses import pose_from_angles
 
 CABLES = ("C1", "C2")
@@ -93,6 +93,20 @@ def test_other_rotations_without_a_position_are_one_too(read):
     np.testing.assert_allclose(log.tilts, [[0.0, 0.0, np.radians(40.0)]], atol=1e-12)
 
 
+@pytest.mark.parametrize("nothing", ["nan", "NA", "null", "", "-"])
+def test_words_for_nothing_measured(read, nothing):
+    log = read(f"l1,l2\n1,{nothing}\n2,3\n")
+    np.testing.assert_array_equal(log.lengths, [[1.0, np.nan], [2.0, 3.0]])
+
+
+def test_cables_with_other_names_are_bound_by_their_order_and_a_remark_says_so(read):
+    log = read("C1_length_m,E_length_m\n1,2\n")
+    np.testing.assert_array_equal(log.lengths, [[1.0, 2.0]])
+    assert "E is C2" in log.remarks[0]
+    with pytest.raises(LogFileError, match="cables: found A, B, D; accepted: those of the robot"):
+        read("A_length_m,B_length_m,D_length_m\n1,2,3\n")
+
+
 def test_corners_of_tags(read):
     names = [f"tag7_{a}{c}_px" for c in range(1, 5) for a in "uv"]
     log = read(",".join(names) + "\n" + ",".join("12345678") + "\n")
@@ -102,16 +116,15 @@ def test_corners_of_tags(read):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "empty log"),
-        ("# nothing\n\n", "empty log"),
+        ("", "an empty file"),
+        ("# nothing\n\n", "found no rows"),
         ("l1,l2\n", "a header without rows"),
-        ("l1,l2\n1,nan\n", ":2: l2: found nan"),
-        ("l1,l2\n1,inf\n", ":2: l2: found inf"),
-        ("l1,l2\n1,2\n1,x7\n", ":3: l2: found x7"),
+        ("l1,l2\n1,inf\n", ":2: l2: found 'inf'"),
+        ("l1,l2\n1,2\n1,x7\n", ":3: l2: found 'x7'"),
         ("l1,l2\n1,2,3\n", "found 3 cells"),
         ("l1,C1_length_m\n1,2\n", "twice"),
         ("a,b\n1,2\n", "columns: found a, b"),
-        ("1 2 3\n", "3 columns without a header"),
+        ("1 2 3\n", "3 columns of numbers without a header"),
         ("x,y,z,qw,l1\n1,2,3,1,1\n", "quaternion: found 1 columns"),
         ("x,y,z,qw,qx,qy,qz\n1,2,3,2,0,0,0\n", "quaternion: found length 2"),
         ("x,y,qw,qx,qy,qz\n1,2,1,0,0,0\n", "position: found 2 columns"),
@@ -120,7 +133,7 @@ def test_corners_of_tags(read):
     ],
 )
 def test_bad_logs_are_named(read, text, words):
-    with pytest.raises(CalibrationError) as problem:
+    with pytest.raises(LogFileError) as problem:
         read(text)
     assert words in str(problem.value)
     assert "accepted" in str(problem.value)
