@@ -27,6 +27,7 @@ from cdpr_drake.analyses.logs.columns import (
     split_unit,
 )
 from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.ros import read_bag
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC, TIME_KEY
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, install_words
@@ -186,8 +187,10 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
     """
     if find_spec("mcap") is None:
         raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
-    channels, poses, other = _messages(path)
+    channels, poses, other, encodings = _messages(path)
     chosen = channels or poses
+    if not chosen and encodings & {"cdr", "ros1"}:
+        return read_bag(path, "", facts)
     if not chosen:
         found = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
         raise LogFileError(f"{path}: found {found}; accepted: messages in JSON")
@@ -218,16 +221,17 @@ def _keys(rows: Rows) -> list[str]:
     return list(next((row for row in rows.values() if len(row) == len(known)), known))
 
 
-def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str]]:
-    """Rows by time of channels of numbers, those of transforms, and channels of something else."""
+def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str], set[str]]:
+    """Rows by time of channels of numbers, those of transforms, other channels, and encodings."""
     from mcap.reader import make_reader
 
     channels: dict[str, Rows] = {}
     poses: dict[str, Rows] = {}
-    other: set[str] = set()
+    other, encodings = set[str](), set[str]()
     try:
         with path.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
+                encodings.add(channel.message_encoding)
                 if channel.message_encoding != "json":
                     other.add(channel.topic)
                     continue
@@ -244,7 +248,7 @@ def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str]]:
     except Exception as problem:  # the library raises of many kinds on damaged files
         words = " ".join(str(problem).split())[:160] or type(problem).__name__
         raise LogFileError(f"{path}: cannot be read as MCAP: {words}") from problem
-    return channels, poses, other
+    return channels, poses, other, encodings
 
 
 def _is_json_number(value: Any) -> bool:
