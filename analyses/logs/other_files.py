@@ -19,12 +19,8 @@ from cdpr_drake.analyses.logs.columns import (
     QUATERNION,
     RPY,
     SECONDS,
-    SI,
     SWIVEL,
     TENSION,
-    UNITS,
-    read_header,
-    split_unit,
 )
 from cdpr_drake.analyses.logs.log import Facts, Log
 from cdpr_drake.analyses.logs.ros import read_bag
@@ -82,8 +78,7 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
         for header, column in zip(_spread(path, name, headers, table, facts), table.T, strict=True):
             if header in columns:
                 raise LogFileError(f"{path}: {name}: found {header} twice; accepted: once")
-            si, factor = _si(header)
-            columns[si] = factor * column
+            columns[header] = column
     columns = dict(sorted(columns.items(), key=lambda item: item[0] != SECONDS))
     rest = [name for name in variables if name not in wanted]
     by = "m, rad, N, s by the format"
@@ -157,16 +152,6 @@ def _spread(path: Path, name: str, headers: list[str], table: Array, facts: Fact
             f"{path}: {name}: found {width} columns; accepted: {len(headers)}: {', '.join(headers)}"
         )
     return headers
-
-
-def _si(header: str) -> tuple[str, float]:
-    """A header with its SI unit, and the factor on its numbers, known quantity or not."""
-    words, unit = split_unit(header)
-    dimension, factor = UNITS.get(unit, ("", 1.0))
-    si = SI.get(dimension, unit)
-    if not unit or unit == si or dimension == "image" or read_header(header, [], 1) is not None:
-        return header, 1.0
-    return f"{header[: len(words)]}_{si}", factor
 
 
 TRANSFORM = "foxglove.FrameTransform"
