@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
 from cdpr_drake.analyses.calibration.log_file import CalibrationLog
 from cdpr_drake.analyses.calibration.rest_log import at_rest
+
 from cdpr_drake.models.robot_loader import load_robot
 
 STANDS, STOPS, NOISE = 30, 5, 1e-4
