@@ -209,13 +209,12 @@ def calibrate(
         log = read_measurements(log, [cable.name for cable in loaded.cables])
     if tracker_late is not None:
         log = log.shifted(tracker_late)
-    default = unknown is None
     names = default_unknown(loaded, log) if unknown is None else _names(unknown)
     sigmas = dict(sigmas or {})
     for name in sigmas:
         if name not in vars(HOMING):
             raise CalibrationError(f"sigmas: found {name!r}; {accepted_names(name, vars(HOMING))}")
-    homing = default and is_homing(loaded, log)
+    homing = unknown is None and is_homing(loaded, log)
     task = CalibrationTask(
         robot=loaded, log=log, unknown=names, priors=dict(priors or {}), bounds=dict(bounds or {}),
         sigmas=replace(HOMING if homing else Sigmas(), **sigmas),
@@ -237,21 +236,14 @@ def calibrate(
         return fit if propose is None else with_next_poses(fit, propose, follow.doing)
 
     arguments = plain({
-        "verb": "calibrate", "robot": loaded.name, "log": str(log.path), "rows": log.count,
-        **{name: getattr(task, name) for name in OPTIONS}, "tracker_late": tracker_late,
-        "hold_out": hold_out, "propose": propose,
+        **vars(task), "verb": "calibrate", "robot": loaded.name, "log": str(log.path),
+        "rows": log.count, "tracker_late": tracker_late, "hold_out": hold_out, "propose": propose,
     })  # fmt: skip
     return kept_fit(
         f"calibrate-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
         formats=formats, follow=follow,
     )  # fmt: skip
 
-
-OPTIONS = (
-    "unknown", "priors", "bounds", "sigmas", "tags", "mount", "image_size", "start", "zero", "rest",
-    "outliers",
-)  # fmt: skip
-"""Fields of a task by which the marker of a results folder tells calibrations apart."""
 
 _SIGMAS = ", ".join(
     f.name + ("" if f.default is None else f" ({f.default:g})") for f in fields(Sigmas)

@@ -51,12 +51,11 @@ from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import simulated_corners
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.pose_design import choose_poses, informing_rows
 from cdpr_drake.calibration.pose_search import guessed_stations
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError, ScenarioError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line

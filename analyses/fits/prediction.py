@@ -17,7 +17,6 @@ from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.logs.measurements import Measurements, off_plane
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_poses,
@@ -25,7 +24,7 @@ from cdpr_drake.calibration.measurements import (
 )
 from cdpr_drake.calibration.pose_design import choose_poses, expected_std, informing_rows
 from cdpr_drake.calibration.pose_search import robust_poses
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.calibration.sensor_terms import Course
 from cdpr_drake.calibration.stations import Point, Stations

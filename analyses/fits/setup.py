@@ -16,11 +16,10 @@ from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.logs.measurements import Measurements, off_plane, on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import guessed_tags, guessed_tracker, poses_by_tags, with_tags
-from cdpr_drake.calibration.measured_program import first_readings
 from cdpr_drake.calibration.parameters import CalibrationModel, parameter_layout
 from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.pose_search import guessed_from
-from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, CdprError
 from cdpr_drake.models.camera_catalogue import load_camera

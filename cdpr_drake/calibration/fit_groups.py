@@ -40,7 +40,7 @@ from scipy.special import comb, gammaln
 from scipy.stats import binom, hypergeom, norm, t
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import UNTOLD, LeastSquares
+from cdpr_drake.calibration.elimination import MOST_POSES, UNTOLD, LeastSquares
 from cdpr_drake.calibration.pose_search import OUTLIER
 from cdpr_drake.calibration.result import CalibrationResult, used_rows
 from cdpr_drake.calibration.stations import POSE, Point
@@ -91,6 +91,9 @@ of freedom, which holds where readings of few degrees leave components undecided
 
 LEAST_DEGREES = 0.5
 """Degrees of freedom from which on a kind tells its own scatter; below, that of all is taken."""
+
+MOST_NUMBERS = 2_000_000
+"""Numbers of the errors that are projected at a time."""
 
 Rows = npt.NDArray[np.intp]
 Flags = npt.NDArray[np.bool_]
@@ -287,7 +290,9 @@ class _Residuals:
         self.names = [term.row_name(c, at.model.names) for term, c in every]
         self.units = [term.row_unit(c) for term, c in every]
         self.sigma = np.concatenate([term.sigmas() for term in terms], axis=1)
-        self.whole, A, self.slopes = replace(problem, dropped=None).evaluate(at)
+        blocks = replace(problem, dropped=None).blocks(at)
+        parts = [part.evaluate(there) for part, there in blocks]
+        self.whole, A, self.slopes = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         values = np.nan_to_num(np.concatenate([term.values(at) for term in terms], axis=1))
         valued = self.measured & np.any(values != 0.0, axis=0)
         self.expected = np.where(valued, values / self.sigma + self.whole, 0.0)
@@ -309,14 +314,19 @@ class _Residuals:
         """Degrees of freedom and scatter of each kind, by variance components."""
         count, V = len(self.members), self._inverse
         own = np.where(self.used, 1.0, 0.0)
-        rest = np.eye(own.shape[1]) * own[:, :, None] - self._B @ self._Bt
-        hat = self.A @ V @ np.swapaxes(self.A, 1, 2)
-        self.degrees_of = self.members @ np.einsum("krr->r", rest - hat)
+        traces, both = [], []
+        for begin in range(0, len(own), MOST_POSES):
+            some = slice(begin, begin + MOST_POSES)
+            rest = np.eye(own.shape[1]) * own[some][:, :, None] - self._B[some] @ self._Bt[some]
+            hat = self.A[some] @ V @ np.swapaxes(self.A[some], 1, 2)
+            traces.append(np.einsum("krr->r", rest - hat))
+            both.append(np.sum(rest**2 - 2.0 * rest * hat, axis=0))
+        self.degrees_of = self.members @ sum(traces[1:], traces[0])
         self.degrees = float(self.degrees_of.sum())
         S = [
             np.einsum("krf,krh->fh", self.A * own, self.A) for own in self.members[:, None, :, None]
         ]
-        squares = self.members @ np.sum(rest**2 - 2.0 * rest * hat, axis=0) @ self.members.T
+        squares = self.members @ sum(both[1:], both[0]) @ self.members.T
         P = self._prior.T @ self._prior
         squares += [[np.sum((V @ S[a]) * (V @ S[b]).T) for b in range(count)] for a in range(count)]
         known = np.array([np.sum((V @ S[a]) * (V @ P).T) for a in range(count)])
@@ -468,6 +478,20 @@ def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
 
 def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFault]:
     """Those of some errors that are likely, one of each test and quantity."""
+    best: dict[tuple[str, str], GroupFault] = {}
+    at_once = max(1, MOST_NUMBERS // residuals.r.size)
+    for begin in range(0, len(errors), at_once):
+        _test(residuals, errors[begin : begin + at_once], len(errors), best)
+    yield from best.values()
+
+
+def _test(
+    residuals: _Residuals,
+    errors: Sequence[_Error],
+    tests: int,
+    best: dict[tuple[str, str], GroupFault],
+) -> None:
+    """Adds errors that are likely, of so many tests, to the best ones."""
     D = np.stack([one.error for one in errors], axis=2)
     projected, prior = residuals.projected(D)
     size = np.einsum("krn,krn->n", D, projected)
@@ -475,7 +499,6 @@ def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFa
     whole = np.einsum("krn,krn->n", D, D)
     kinds = residuals.members @ np.einsum("krn,krn->rn", projected, projected)
     own = residuals.members @ np.einsum("kr,krn->rn", residuals.r, projected)
-    best: dict[tuple[str, str], GroupFault] = {}
     for n, one in enumerate(errors):
         if size[n] <= LEAST_SEEN * whole[n] or size[n] <= 0.0:
             continue
@@ -490,10 +513,9 @@ def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFa
             continue
         std = float(np.sqrt(variance)) / size[n]
         chance, key = 2.0 * float(t.sf(abs(c) / std, freedom)) * one.sets, (one.test, one.quantity)
-        if chance < min(LIKELY / len(errors), best[key].probability if key in best else 1.0):
-            certain = chance < FALSE_ALARM / len(errors)
+        if chance < min(LIKELY / tests, best[key].probability if key in best else 1.0):
+            certain = chance < FALSE_ALARM / tests
             best[key] = _fault(residuals, one, (c, std, chance), certain)
-    yield from best.values()
 
 
 def _variance(

@@ -52,6 +52,7 @@ def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
     again = load_scenario(str(out / "scenario.yaml"))
     assert again.perturbations.believed_robot == str(out / BELIEVED_FILE)
     assert {path.stem for path in out.glob("*.png")} == {"calibration", "correlation"}
+    assert not (out / "inputs.json").exists()  # the robot that was found is no file of the user
     assert "calibrated" in repr(found)
     with pytest.raises(OutputFolderError, match="add overwrite"):
         calibrate_campaign(scenario, poses=8, folder=out)
