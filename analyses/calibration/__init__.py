@@ -1,13 +1,7 @@
-"""Calibration of a robot's geometry, and identification of its dynamics, from logs.
+"""Free motion of a platform on standing winches: the mathematics of `identify_swings`.
 
-Both read a log, estimate parameters, report them, and write a robot file, and all numbers as JSON.
-A log is text with columns that bear their names and units, see `read_log`.
-
-* Calibration gives a robot file that scenarios take as `perturbations.believed_robot`.
-* Identification also validates what it found. Logs that `cdpr simulate` writes can be its logs, and
-  scenarios take its robot file as what the controller believes.
-
-Source: see `cdpr_drake.calibration` and `cdpr_drake.identification`.
+`fit_free_motion` predicts stretches of a log of a swing from their first states, by a robot whose
+dynamics, sensors and cables have unknown parameters, and finds these.
 """
 
 import lazy_loader

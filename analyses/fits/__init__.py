@@ -4,7 +4,11 @@ Each is a verb that gives a `Fit`, which writes a file of what it found, and all
 
 * `calibration.calibrate` gives a robot file that scenarios take as
   `perturbations.believed_robot`.
-* `campaign.calibrate_campaign` shows the same in simulation, with the robot of a scenario.
+* `identification.identify` gives one with dynamics from a motion, `swings.identify_swings` from
+  swings on standing winches.
+* `camera.calibrate_camera` gives a camera file, from images of a board.
+* `campaign.calibrate_campaign` and `identify_campaign.identify_campaign` show the same in
+  simulation, with the robot of a scenario.
 
 Source: see `cdpr_drake.calibration` and `cdpr_drake.identification`.
 """

@@ -125,6 +125,11 @@ class Fit(Result):
         """Of a command; `MISFIT_CODE` for a misfit."""
         return 0 if self.fits else MISFIT_CODE
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the unknowns, as `cdpr_drake.ParameterCovariance` has them."""
+        return tuple(unknown.name for unknown in self.unknowns)
+
     @cached_property
     def correlation(self) -> Array | None:
         """Correlation of the unknowns, shape (f, f); None without a covariance."""
