@@ -71,8 +71,8 @@ EXTRAS = {
     "gymnasium": ("gym", "learning environments"), "nicegui": ("studio", "cdpr studio"),
     "pyzmq": ("bridge", "cdpr serve"), "distributed": ("cluster", "Dask clusters"),
     "cmaes": ("design", "cdpr design"), "pyarrow": ("parquet", "logs as parquet"),
-    "mcap": ("mcap", "logs of MCAP"), "trimesh": ("mesh", "meshes of obstacles"),
-    "mujoco": ("mjcf", "files of MuJoCo"),
+    "mcap": ("mcap", "logs of MCAP"), "rosbags": ("ros", "bags of ROS"),
+    "trimesh": ("mesh", "meshes of obstacles"), "mujoco": ("mjcf", "files of MuJoCo"),
 }  # fmt: skip
 """Packages that one part needs and the rest does without: their extra, and that part."""
 

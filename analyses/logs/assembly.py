@@ -152,15 +152,14 @@ def assemble(
 
 def numbers(cells: Cells, decimal: str = ".") -> tuple[Array, int | None]:
     """Numbers of cells, NaN where nothing was measured; and the first row without a number."""
-    if isinstance(cells, np.ndarray):
-        values = np.asarray(cells, float)
-    else:
+    try:
+        values = np.array(cells, float)
+    except ValueError:
         words = [plain_number(cell, decimal) for cell in cells]
-        try:
-            values = np.array(words, float)
-        except ValueError:
-            bad = next(k for k, word in enumerate(words) if not _is_float(word))
-            return np.full(len(words), np.nan), bad
+        bad = next((k for k, word in enumerate(words) if not _is_float(word)), None)
+        values = np.full(len(words), np.nan) if bad is not None else np.array(words, float)
+        if bad is not None:
+            return values, bad
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     return values, int(beyond[0]) if len(beyond) else None
 

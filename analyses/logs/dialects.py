@@ -21,6 +21,14 @@ from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
 from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
 from cdpr_drake.analyses.logs.log import Facts, Log
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
+from cdpr_drake.analyses.logs.ros import (
+    ROS1,
+    ROS_COLUMNS,
+    SQLITE,
+    Headers,
+    read_bag,
+    renamed,
+)
 from cdpr_drake.analyses.logs.text import (
     plain_text,
     read_bytes,
@@ -35,8 +43,6 @@ AUTO, CSV = "auto", "csv"
 
 HEAD = 60_000
 """Bytes at the top of a file by which it is recognised."""
-
-Headers = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -123,7 +129,7 @@ def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
         headers = list(mapping)
     elif headed:
         why = DIALECTS[dialect].knows(text) or "it has headers"
-        headers = [_header(cell, DIALECTS[dialect].columns) for cell in rows[0]]
+        headers = [renamed(cell, DIALECTS[dialect].columns) for cell in rows[0]]
     elif m and width in (m, 2 * m):  # as GRAB's tools write
         why = f"it has {width} columns of numbers for {m} cables"
         names = facts.cables or facts.robot_cables
@@ -147,26 +153,6 @@ def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
         },
     )  # fmt: skip
 
-
-def _header(cell: str, patterns: Headers) -> str:
-    """The header with a unit for which one of a file stands."""
-    for pattern, target in patterns:
-        found = re.fullmatch(pattern, cell)
-        if found:
-            return target.format(*found.groups())
-    return cell
-
-
-ROS_COLUMNS: Headers = (
-    (r"%time|(?:field\.)?header\.stamp", "time_ns"), (r"__time", "time_s"),
-    (r"(?:.*[./])?(?:position|translation|point)[./]([xyz])", "{}_m"),
-    (r"(?:.*[./])?(?:orientation|rotation|quaternion)[./]([xyzw])", "q{}"),
-    (r"(?:.*[./])?position(?:\.|\[)?(\d+)\]?", "cable{}_motor_rad"),
-    (r"(?:.*[./])?effort(?:\.|\[)?(\d+)\]?", "cable{}_torque_nm"),
-    (r"(?:.*[./])?(?:header[./].*|name\d*|child_frame_id|velocity.*)", ""),
-)  # fmt: skip
-"""rostopic echo -p writes field.pose.position.x, PlotJuggler /topic/pose/position/x; joints are
-position0, position1, ..."""
 
 DIALECTS = {
     "hangprinter": Dialect(
@@ -193,6 +179,11 @@ DIALECTS = {
         "GRAB's parsed .mat, or any with a mapping", magic(other_files.MAT), other_files.read_mat,
         binary=True,
     ),
+    "rosbag": Dialect(
+        "bags of ROS 1 and 2: .bag, .db3, .mcap with CDR, or their folder",
+        lambda head: magic(ROS1)(head) or magic(SQLITE, "the magic bytes of SQLite")(head),
+        read_bag, binary=True,
+    ),
     "mcap": Dialect(
         "MCAP with messages in JSON, as runs leave it",
         magic(other_files.MCAP, "the magic bytes of MCAP"), other_files.read_mcap, binary=True,
@@ -214,6 +205,8 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
             line.
     """
     path, facts = Path(path), Facts() if facts is None else facts
+    if (path / "metadata.yaml").is_file() and dialect in (AUTO, "rosbag"):
+        return read_bag(path, "", facts)
     if not path.is_file() or not path.stat().st_size:
         what = "a folder" if path.is_dir() else "an empty file" if path.exists() else "no such file"
         raise LogFileError(f"{path}: found {what}; accepted: a log")
@@ -253,9 +246,11 @@ def recognise(path: Path) -> tuple[str, str]:
     fits: dict[str, str] = {}
     for name, how in DIALECTS.items():
         head = raw if how.binary else text
-        if head is not None and not (name == CSV and fits):
+        if head is not None:
             why = how.knows(head)
             fits |= {name: why} if why else {}
+    if len(fits) > 1:
+        fits.pop(CSV, None)
     if len(fits) > 1:
         words = "; ".join(f"{name}, as {why}" for name, why in fits.items())
         raise LogFileError(

@@ -103,7 +103,7 @@ OutFile: TypeAlias = Annotated[Path | str | None, words(Path, "the path of a fil
 def facts_of(
     cables: Sequence[str] | None = None, *, unit: Mapping[str, str] | None = None,
     mapping: Path | str | None = None, rate: float | None = None, body: str | None = None,
-    axes: Any = None,
+    axes: Any = None, topic: Sequence[str] | None = None,
 ) -> Facts:  # fmt: skip
     """What is known of a log beside its file; arguments as of `import_log`.
 
@@ -119,7 +119,8 @@ def facts_of(
         raise LogFileError(f"rate: found {rate!r}; accepted: above 0 [1/s]")
     facts = Facts(
         cables=None if cables is None else tuple(cables), units=checked_units(unit or {}),
-        rate=rate, body=body, R_WF=axes_rotation(axes) if isinstance(axes, str) else axes,
+        rate=rate, body=body, topics=None if topic is None else tuple(topic),
+        R_WF=axes_rotation(axes) if isinstance(axes, str) else axes,
     )  # fmt: skip
     return facts if mapping is None else with_mapping(facts, Path(mapping))
 
@@ -130,7 +131,7 @@ def import_log(
     beside: Annotated[Path | None, Parameter(name="--with")] = None,
     log_format: LogFormat = AUTO, with_format: LogFormat = AUTO, robot: RobotWord = None,
     cables: Names | None = None, unit: Units = None, mapping: MappingFile = None,
-    rate: Rate = None, body: str | None = None, axes: Axes = None,
+    rate: Rate = None, body: str | None = None, topic: Names | None = None, axes: Axes = None,
     start: Annotated[float | None, Parameter(name="--from")] = None, until: float | None = None,
     every: Annotated[int, whole(1)] = 1, overwrite: Switch = False,
 ) -> Log:  # fmt: skip
@@ -156,6 +157,7 @@ def import_log(
             header; skip_rows, separator, rate_hz.
         rate: Rows per second, for files without times [1/s].
         body: Rigid body of a tracker that is the platform.
+        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
         axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
         start: First instant [s].
         until: Last instant [s].
@@ -177,7 +179,8 @@ def import_log(
         raise CdprError("cables: found with robot; accepted: one of them")
     if robot is not None:
         cables = [cable.name for cable in as_robot(robot, "import_log").cables]
-    facts = facts_of(cables, unit=unit, mapping=mapping, rate=rate, body=body, axes=axes)
+    facts = facts_of(cables, unit=unit, mapping=mapping, rate=rate, body=body, axes=axes,
+                     topic=topic)  # fmt: skip
     log = without_packets(read_log(file, facts, log_format))
     idle = _idle(log, facts)
     if beside is not None:
@@ -201,6 +204,8 @@ def _idle(log: Log, facts: Facts) -> list[str]:
         idle.append(f"a rate of {facts.rate:g} 1/s, since the file has times")
     if facts.body is not None and log.dialect != "motive":
         idle.append(f"the rigid body {facts.body}, since only motive files have some")
+    if facts.topics is not None and log.dialect != "rosbag":
+        idle.append(f"the topics {', '.join(facts.topics)[:80]}, since only bags have some")
     stems = [name.removeprefix(COMMANDED).removeprefix(ESTIMATED) for name in log.frame]
     if facts.cables and not any(s.startswith(f"{c}_") for c in facts.cables for s in stems):
         idle.append(f"the cables {', '.join(facts.cables)[:80]}, since no column is of one")

@@ -260,21 +260,29 @@ class Log(Result):
         return {"log": self._draw}
 
     def _draw(self) -> Figure:
-        from cdpr_drake.analyses.frame.figures import few_ticks, panels, shade, styled
+        from cdpr_drake.analyses.frame.figures import curves, few_ticks, panels, shade, styled
+        from cdpr_drake.palette import nth_look
 
-        groups = self._panels()[:MOST_PANELS]
+        groups, time = self._panels()[:MOST_PANELS], self.time
         names = {SECONDS, *(name for _, group in groups for name in group)}
         left = [name for name in self.frame if name not in names]
         more = f" and {len(left) - MOST_NAMED} more" * (len(left) > MOST_NAMED)
         title = f"{self.path.name}: {self.rows_words()}"
         title += f"\nnot drawn: {', '.join(left[:MOST_NAMED])}{more}" if left else ""
-        time = self.time
         t = np.arange(1.0, len(self.frame) + 1.0) if time is None else time
         figure, rows = panels(len(groups), 1, (9.0, 1.2 + 2.1 * max(len(groups), 1)), title)
         with styled():
             for axes, (label, group) in zip(rows, groups, strict=False):
-                for k, name in enumerate(group):
-                    self._draw_column(axes, t, name, k, len(group))
+                stems = [name.rpartition("_")[0] or name for name in group]
+                if len(t) > DENSE:
+                    curves(axes, t, self.table(group), stems)
+                else:
+                    for k, (name, stem) in enumerate(zip(group, stems, strict=True)):
+                        look = nth_look(k)
+                        axes.plot(
+                            t, self.frame[name], color=look.color, marker=look.marker or "o",
+                            linestyle="none", markersize=4.5, markerfacecolor="white", label=stem,
+                        )  # fmt: skip
                 if time is not None and len(time) > 1:
                     steps = np.diff(time)
                     wide = np.append(steps > GAP * np.median(steps), False)
@@ -286,19 +294,6 @@ class Log(Result):
                 axes.set_xlim(*((0.5, len(t) + 0.5) if time is None else (float(t[0]), end)))
             rows[-1].set_xlabel("time [s]" if time is not None else "row")
         return figure
-
-    def _draw_column(self, axes: Any, t: Array, name: str, number: int, count: int) -> None:
-        from cdpr_drake.analyses.frame.figures import draw_curve, phase_of
-        from cdpr_drake.palette import nth_look
-
-        look, label, values = nth_look(number), name.rpartition("_")[0] or name, self.frame[name]
-        if len(t) <= DENSE:
-            axes.plot(
-                t, values, color=look.color, linestyle="none", marker=look.marker or "o",
-                markersize=4.5, markerfacecolor="white", label=label,
-            )  # fmt: skip
-        else:
-            draw_curve(axes, t, values.to_numpy(), look, label, phase=phase_of(number, count))
 
     def _panels(self) -> list[tuple[str, list[str]]]:
         """Label and columns of each panel."""

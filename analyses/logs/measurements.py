@@ -267,6 +267,7 @@ def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
     used = (ledger["fate"] == READ) & ~ledger["kind"].isin(_NOT_FITTED) & ~ledger["name"].isin(lost)
     unread = ledger["header"][~used & (ledger["fate"] != LEFT_OUT)].tolist()
     remarks = [f"columns not read: {', '.join(unread)}"] if unread else []
+    remarks += [f"{log.repeated} repeated rows left out"] if log.repeated else []
     remarks += [remark for remark in log.remarks if not re.match(_SAID_OTHERWISE, remark)]
     headers: dict[str, tuple[str, ...]] = {}
     for kind, header in zip(ledger["kind"][used], ledger["header"][used], strict=True):

@@ -19,14 +19,11 @@ from cdpr_drake.analyses.logs.columns import (
     QUATERNION,
     RPY,
     SECONDS,
-    SI,
     SWIVEL,
     TENSION,
-    UNITS,
-    read_header,
-    split_unit,
 )
 from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.ros import read_bag
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC, TIME_KEY
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, install_words
@@ -81,8 +78,7 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
         for header, column in zip(_spread(path, name, headers, table, facts), table.T, strict=True):
             if header in columns:
                 raise LogFileError(f"{path}: {name}: found {header} twice; accepted: once")
-            si, factor = _si(header)
-            columns[si] = factor * column
+            columns[header] = column
     columns = dict(sorted(columns.items(), key=lambda item: item[0] != SECONDS))
     rest = [name for name in variables if name not in wanted]
     by = "m, rad, N, s by the format"
@@ -158,16 +154,6 @@ def _spread(path: Path, name: str, headers: list[str], table: Array, facts: Fact
     return headers
 
 
-def _si(header: str) -> tuple[str, float]:
-    """A header with its SI unit, and the factor on its numbers, known quantity or not."""
-    words, unit = split_unit(header)
-    dimension, factor = UNITS.get(unit, ("", 1.0))
-    si = SI.get(dimension, unit)
-    if not unit or unit == si or dimension == "image" or read_header(header, [], 1) is not None:
-        return header, 1.0
-    return f"{header[: len(words)]}_{si}", factor
-
-
 TRANSFORM = "foxglove.FrameTransform"
 """Schema of poses."""
 
@@ -186,8 +172,10 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
     """
     if find_spec("mcap") is None:
         raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
-    channels, poses, other = _messages(path)
+    channels, poses, other, encodings = _messages(path)
     chosen = channels or poses
+    if not chosen and encodings & {"cdr", "ros1"}:
+        return read_bag(path, "", facts)
     if not chosen:
         found = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
         raise LogFileError(f"{path}: found {found}; accepted: messages in JSON")
@@ -218,16 +206,17 @@ def _keys(rows: Rows) -> list[str]:
     return list(next((row for row in rows.values() if len(row) == len(known)), known))
 
 
-def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str]]:
-    """Rows by time of channels of numbers, those of transforms, and channels of something else."""
+def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str], set[str]]:
+    """Rows by time of channels of numbers, those of transforms, other channels, and encodings."""
     from mcap.reader import make_reader
 
     channels: dict[str, Rows] = {}
     poses: dict[str, Rows] = {}
-    other: set[str] = set()
+    other, encodings = set[str](), set[str]()
     try:
         with path.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
+                encodings.add(channel.message_encoding)
                 if channel.message_encoding != "json":
                     other.add(channel.topic)
                     continue
@@ -244,7 +233,7 @@ def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str]]:
     except Exception as problem:  # the library raises of many kinds on damaged files
         words = " ".join(str(problem).split())[:160] or type(problem).__name__
         raise LogFileError(f"{path}: cannot be read as MCAP: {words}") from problem
-    return channels, poses, other
+    return channels, poses, other, encodings
 
 
 def _is_json_number(value: Any) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from cyclopts import Parameter
@@ -73,8 +73,7 @@ MODEL_COLOR = (0.9, 0.6, 0.0, 0.45)
 """Color of the platform as the model has it for the measured lengths."""
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
+class Followed(NamedTuple):
     """The simulated robot, driven with the lengths of a log.
 
     Attributes:
@@ -82,25 +81,12 @@ class Followed:
         rows: Rows of the log, shape (q,).
         poses: X_WP, shape (q, 7).
         tensions: Shape (q, m) [N].
-        distances: Distances from the measured positions, shape (q,) [m].
-        tension_errors: Simulated minus measured, NaN where not measured, shape (q, m) [N].
     """
 
     time: Array
     rows: np.ndarray
     poses: Array
     tensions: Array
-    distances: Array
-    tension_errors: Array
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        numbers: dict[str, Any] = finite({
-            "rows": len(self.time), "position_error_rms_m": _rms(self.distances),
-            "position_error_largest_m": _most(self.distances),
-            "tension_error_rms_n": _rms(self.tension_errors),
-        })  # fmt: skip
-        return numbers
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -108,14 +94,12 @@ class Replay(Result):
     """A run beside its model; rows in which something was not measured have NaN there.
 
     Attributes:
-        robot: The robot.
-        log: The log.
+        robot, log: The robot and the log.
         time: Shape (k,) [s], or numbers of rows where there are no times.
         poses: Measured X_WP, shape (k, 7), see `pose_row`; NaN for turns that were not measured.
         poses_by_lengths: The model's, for the measured lengths, shape (k, 7).
-        lengths: Measured, or by the motors' angles, shape (k, m) [m].
+        lengths, tensions: Measured, lengths also by motor angles, shape (k, m) [m, N].
         predicted_lengths: The model's at the measured poses, shape (k, m) [m].
-        tensions: Measured, shape (k, m) [N].
         predicted_tensions: Those that carry the weight, shape (k, m) [N]; NaN with more cables
             than degrees of freedom.
         unbalanced: What measured tensions and weight leave on the platform, along its degrees of
@@ -123,8 +107,7 @@ class Replay(Result):
         frame: X_WF of the tracker that was fitted; None: it was taken to be W.
         followed: The simulated robot; None: it was not simulated.
         remarks: What binding the log to the robot left out or assumed.
-        folder: Results folder; None: nothing was kept.
-        failed: Why files were not written, by name.
+        folder, failed: Results folder or None, and why files were not written, by name.
     """
 
     robot: Robot
@@ -176,8 +159,21 @@ class Replay(Result):
             "position_by_lengths_largest_m": _most(self.distances),
             "unbalanced_force_rms_n": _rms(self.forces), "tracker_frame": frame,
         })  # fmt: skip
-        followed = None if self.followed is None else self.followed.as_dict()
+        followed: dict[str, Any] | None = None
+        if self.followed is not None:
+            rows, apart = self.followed.rows, self.followed_distances()
+            followed = {
+                "rows": len(rows), "position_error_rms_m": _rms(apart),
+                "position_error_largest_m": _most(apart),
+                "tension_error_rms_n": _rms(self.followed.tensions - self.tensions[rows]),
+            }  # fmt: skip
         return {**numbers, "followed": followed, "remarks": list(self.remarks)}
+
+    def followed_distances(self) -> Array:
+        """Distances of the simulated robot from the measured positions, shape (q,) [m]."""
+        assert self.followed is not None
+        steps = self.followed.poses[:, 4:] - self.poses[self.followed.rows, 4:]
+        return np.asarray(np.linalg.norm(steps, axis=1))
 
     def _of_cable(self, k: int) -> dict[str, Any]:
         lengths, tensions = self.length_residuals[:, k], self.tensions - self.predicted_tensions
@@ -233,7 +229,7 @@ class Replay(Result):
 
         distances = {"model by lengths": (self.time, 1e3 * self.distances)}
         if self.followed is not None:
-            distances["simulated"] = (self.followed.time, 1e3 * self.followed.distances)
+            distances["simulated"] = (self.followed.time, 1e3 * self.followed_distances())
         tensions = self.tensions - self.predicted_tensions
         residuals = {
             "length, measured\nminus model [mm]": by_cable(1e3 * self.length_residuals),
@@ -504,11 +500,7 @@ def _follow(replay: Replay) -> Followed:
         if k + 1 < len(rows):
             rate = (lengths[rows[k + 1]] - lengths[rows[k]]) / (time[k + 1] - time[k])
             block.GetInputPort("cable_velocities").FixValue(context, rate)
-    return Followed(
-        replay.time[rows], rows, poses, tensions,
-        np.linalg.norm(poses[:, 4:] - replay.poses[rows, 4:], axis=1),
-        tensions - replay.tensions[rows],
-    )  # fmt: skip
+    return Followed(replay.time[rows], rows, poses, tensions)
 
 
 def _mean(values: Array) -> float | None:
@@ -517,10 +509,9 @@ def _mean(values: Array) -> float | None:
 
 
 def _rms(values: Array) -> float | None:
-    present = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(present**2))) if len(present) else None
+    square = _mean(values**2)
+    return None if square is None else float(np.sqrt(square))
 
 
 def _most(values: Array) -> float | None:
-    present = values[np.isfinite(values)]
-    return float(np.max(np.abs(present))) if len(present) else None
+    return float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else None

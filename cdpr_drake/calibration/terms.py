@@ -61,13 +61,18 @@ class Term(ABC):
         """Residuals in the unit, shape (k, rows), and their derivatives by what is unknown of each
         pose, shape (k, rows, width), and by parameters."""
 
-    def evaluate(self, at: Point) -> Evaluated:
+    def evaluate(self, at: Point, free: npt.NDArray[np.bool_] | None = None) -> Evaluated:
         """Residuals over their sigmas, shape (k, rows), zero where nothing was measured, and their
-        derivatives by all parameters, (k, rows, n), and by each pose, (k, rows, width)."""
+        derivatives by the free parameters, (k, rows, f), or all, and by each pose, (k, rows,
+        width)."""
         residual, B, slopes = self.parts(at)
-        A = np.zeros((*residual.shape, at.layout.size))
+        free = np.ones(at.layout.size, bool) if free is None else free
+        count = int(np.sum(free))
+        places = np.where(free, np.cumsum(free) - 1, count)  # those of the others are cut off
+        A = np.zeros((*residual.shape, count + 1))
         for rows, columns, values in slopes:
-            A[:, rows, columns] = values
+            A[:, rows, places[columns]] = values
+        A = A[:, :, :count]
         weight = self.weights()
         return self._weighted(residual, weight), A * weight[:, :, None], B * weight[:, :, None]
 
@@ -408,9 +413,9 @@ class EquilibriumTerm(Term):
     def _weighted(self, residual: Array, weight: Array) -> Array:
         return residual * weight
 
-    def evaluate(self, at: Point) -> Evaluated:
+    def evaluate(self, at: Point, free: npt.NDArray[np.bool_] | None = None) -> Evaluated:
         """As the base class says; moments and forces have one sigma each, which bases keep."""
-        r, A, B = super().evaluate(at)
+        r, A, B = super().evaluate(at, free)
         if self.motion is None:
             return r, A, B
         bases = self._bases(at)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cdpr_drake.calibration import elimination
 from cdpr_drake.calibration.measurements import (
     simulated_corners,
     simulated_poses,
@@ -321,3 +322,26 @@ def test_a_tracker_that_is_late_tells_where_the_marker_was():
     found = program.Solve(outliers=False)
     assert found.model.clock == pytest.approx(late, abs=5.0 * found.std[0])
     assert found.std[0] < 1e-3
+
+
+def test_terms_give_the_columns_of_free_parameters_and_poses_alone():
+    program = everything()
+    at, free = program.at(), np.random.default_rng(0).uniform(size=program.layout.size) < 0.5
+    for term in program.terms:
+        whole, some = term.evaluate(at), term.evaluate(at, free)
+        np.testing.assert_array_equal(some[1], whole[1][:, :, free])
+        for mine, other in zip(term.by_poses(at), whole[::2], strict=True):
+            np.testing.assert_array_equal(mine, other)
+
+
+def test_blocks_of_poses_make_the_same_equations(monkeypatch):
+    program = everything()
+    problem, at = program.least_squares(3.0), program.at()
+    whole = problem.normal_equations(at, 1e-3)
+    monkeypatch.setattr(elimination, "MOST_POSES", 2)
+    assert len(list(problem.blocks(at))) > 1
+    parts = problem.normal_equations(at, 1e-3)
+    for name in ("S", "S_data", "rhs", "back", "alone", "H"):
+        one, other = getattr(parts, name), getattr(whole, name)
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.max(np.abs(other)))
+    np.testing.assert_array_equal(problem.used(at), everything().least_squares().used(at))

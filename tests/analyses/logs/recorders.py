@@ -141,3 +141,58 @@ def ros(count=6):
         for k in range(count)
     ]
     return "\n".join([header, *rows]) + "\n"
+
+
+def grab_older(cells, count=40):
+    """Raw lines of 11 or 12 cells; one actuator comes a millisecond late, as its bus has it."""
+    lines = []
+    for k in range(count):
+        for i in range(4):
+            t = 627.023 + 0.01 * k + 0.001 * (i == 3 and k % 5 == 0)
+            length, tension = 0.5 + 0.1 * i + 0.001 * k, [f"{29.0 + i:.4f}"] * (cells == 12)
+            numbers = [f"{length:.6f}", *tension, str(k), "1", f"{0.01 * k:.6f}"]
+            lines.append(",".join(["3", f"{t:.3f}", str(i), "0", "-5561", "0", "596", *numbers]))
+    return "\n".join(lines) + "\n"
+
+
+def rosbag(folder, plugin, count=50):
+    """A bag of ROS 2 with a tracker at 50 Hz and two winches at 100 Hz, 5 ms apart."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind = store.types
+    make, start = {name.rpartition("/")[2]: kind[name] for name in kind}, 1_732_800_000 * 10**9
+
+    def header(ns):
+        stamp = make["Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+        return make["Header"](stamp=stamp, frame_id="world")
+
+    with Writer(folder, version=9, storage_plugin=plugin) as writer:
+        topics = {
+            name: (writer.add_connection(name, type_name, typestore=store), type_name)
+            for name, type_name in (
+                ("/tracker/pose", "geometry_msgs/msg/PoseStamped"),
+                ("/winches", "sensor_msgs/msg/JointState"), ("/note", "std_msgs/msg/String"),
+            )
+        }  # fmt: skip
+
+        def write(topic, ns, message):
+            connection, type_name = topics[topic]
+            writer.write(connection, ns + 300, store.serialize_cdr(message, type_name))
+
+        write("/note", start, make["String"](data="started"))
+        for k in range(2 * count):
+            ns = start + 10_000_000 * k
+            angles = np.array([0.1 * k, -0.2 * k])
+            names = ["winch_left", "winch_right"]
+            write("/winches", ns, make["JointState"](
+                header=header(ns), name=names, position=angles, velocity=0.0 * angles,
+                effort=1.0 + angles,
+            ))  # fmt: skip
+            if k % 2 == 0:
+                ns += 5_000_000
+                turn = make["Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+                place = make["Point"](x=0.01 * (k + 0.5), y=1.0, z=2.0)
+                pose = make["Pose"](position=place, orientation=turn)
+                write("/tracker/pose", ns, make["PoseStamped"](header=header(ns), pose=pose))

@@ -44,7 +44,7 @@ def write(tmp_path):
 
 
 def test_every_reader_has_a_file_here():
-    assert {*FILES, "mat", "mcap"} == set(DIALECTS)
+    assert {*FILES, "mat", "mcap", "rosbag"} == set(DIALECTS)
 
 
 @pytest.mark.parametrize("format", FILES)

@@ -14,6 +14,9 @@ from cdpr_drake.models.robot_loader import load_robot
 OFFSETS = np.array([0.02, -0.01, 0.0, 0.005])
 """Errors of lengths in the log [m]."""
 
+TURNED = 1e-8
+"""Lengths of angles with twelve digits, on a drum of constant radius [m]."""
+
 SMALL = 2e-3
 """Lengths of the simulated robot's cables are those of the log; what it is off is their stretch,
 below a millimetre each, and its swing at 60 Hz [m]."""
@@ -63,6 +66,22 @@ def test_the_simulated_robot_follows_and_results_are_written(tmp_path):
     assert {"summary.json", "replay.csv", "replay.html", "residuals.png"} <= names
     told = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert told["followed"] == found.as_dict()["followed"]
+
+
+def test_motor_angles_and_positions_in_a_plane_are_taken_as_calibrate_takes_them(tmp_path):
+    """Both were ignored: no residual, no row with a pose, and no word about it."""
+    whole = replay_log(written(tmp_path, 0.0 * OFFSETS), robot="gt_graffiti")
+    robot = load_robot("gt_graffiti")
+    angles = whole.lengths / robot.drum().length_per_angle(np.zeros(4))
+    table = np.column_stack([whole.time, angles, whole.poses[:, [4, 6]]])
+    header = "time_s," + ",".join(f"C{k}_motor_angle_rad" for k in (1, 2, 3, 4)) + ",x_m,z_m"
+    path = tmp_path / "angles.csv"
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.12g")
+    found = replay_log(path, robot="gt_graffiti")
+    assert found.as_dict()["rows_with_pose"] == len(table)
+    np.testing.assert_allclose(found.lengths, whole.lengths, atol=TURNED)
+    assert found.as_dict()["cables"]["C1"]["length_residual_largest_m"] < TURNED
+    np.testing.assert_allclose(found.poses[:, 5], robot.home.position[1])
 
 
 def test_a_log_with_nothing_to_compare_is_refused(tmp_path):

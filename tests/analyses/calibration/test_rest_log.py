@@ -1,0 +1,70 @@
+"""What calibrations by balance take of a recorder's log."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.fits.rest_log import at_rest
+from cdpr_drake.analyses.fits.setup import CalibrationTask
+from cdpr_drake.analyses.logs.measurements import Measurements
+from cdpr_drake.models.robot_loader import load_robot
+
+STANDS, STOPS, NOISE = 30, 5, 1e-4
+
+
+@pytest.fixture
+def log():
+    """Lengths, swivel angles that pass pi, and tensions of stops and ways between, at 10 Hz."""
+    random = np.random.default_rng(0)
+    corners = random.uniform(-0.2, 0.2, (STOPS + 1, 4))
+    way = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 40))[:, None]
+    rows = np.vstack([
+        part for a, b in pairwise(corners) for part in (np.tile(a, (STANDS, 1)), a + way * (b - a))
+    ])  # fmt: skip
+    swivels = np.pi + rows + NOISE * random.standard_normal(rows.shape)
+    return Measurements(
+        Path("drive.csv"), len(rows), time=0.1 * np.arange(len(rows)),
+        lengths=1.0 + rows + NOISE * random.standard_normal(rows.shape),
+        swivels=np.arctan2(np.sin(swivels), np.cos(swivels)),
+        tensions=40.0 + 20.0 * rows + 0.1 * random.standard_normal(rows.shape),
+    ), corners[:-1]  # fmt: skip
+
+
+def task(log, rest=None):
+    robot = load_robot("irma4u")
+    return CalibrationTask(robot=robot, log=log, unknown=("length_offsets",), rest=rest)
+
+
+def test_each_stop_is_a_row_with_its_means(log):
+    log, corners = log
+    means = at_rest(task(log)).log
+    assert means.count == STOPS
+    np.testing.assert_allclose(means.lengths, 1.0 + corners, atol=3.0 * NOISE)
+    off = np.exp(1j * means.swivels) / np.exp(1j * (np.pi + corners))
+    np.testing.assert_allclose(np.angle(off), 0.0, atol=3.0 * NOISE)
+    np.testing.assert_allclose(means.tensions, 40.0 + 20.0 * corners, atol=0.1)
+    words = means.remarks[-1]
+    assert f"of {log.count} rows are at rest, in {STOPS} groups" in words
+    assert "rows in which a length or an angle changes" in words
+
+
+def test_a_log_that_balance_does_not_need_stays_as_it_is(log):
+    for same in (task(log[0], rest=False), task(replace(log[0], time=None))):
+        assert at_rest(same) is same
+
+
+def test_without_a_stop_balance_is_left_out_unless_it_is_asked_for(log):
+    time = 0.1 * np.arange(200)
+    rows = 0.2 * np.sin(0.8 * time[:, None] + np.arange(4))
+    drive = Measurements(
+        Path("drive.csv"), 200, time=time, lengths=1.0 + rows, tensions=40.0 + rows
+    )
+    driven = at_rest(task(drive))
+    assert driven.rest is False
+    assert driven.log.remarks == (
+        "the log is of a motion that never rests: balance of forces is not used",
+    )
+    assert at_rest(task(drive, rest=True)).log.count == 200
