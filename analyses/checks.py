@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.frame.result import Listing
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.front.logs import ImportedLog, import_log
-from cdpr_drake.analyses.logs.log_formats import detect_log
+from cdpr_drake.analyses.logs.dialects import recognise
+from cdpr_drake.analyses.logs.import_log import import_log
+from cdpr_drake.analyses.logs.log import Log
 from cdpr_drake.errors import CdprError, meant_names
 from cdpr_drake.models.formats.file_kinds import is_foreign
 from cdpr_drake.models.formats.grab_mat import is_grab_mat
@@ -48,7 +49,7 @@ class CheckedFiles(Listing):
         log: What was read, if one log was checked.
     """
 
-    log: ImportedLog | None = None
+    log: Log | None = None
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The log, if one log was checked."""
@@ -67,7 +68,7 @@ def check_files(files: Sequence[Path], /) -> CheckedFiles:
     """
     entries: list[dict[str, Any]] = []
     words: list[str] = []
-    logs: list[ImportedLog | None] = []
+    logs: list[Log | None] = []
     for file in files:
         entry: dict[str, Any] = {"file": str(file), "kind": None, "problems": [], "notes": []}
         try:
@@ -85,7 +86,7 @@ def check_files(files: Sequence[Path], /) -> CheckedFiles:
     )
 
 
-def _read(path: Path) -> tuple[str, list[str], ImportedLog | None]:
+def _read(path: Path) -> tuple[str, list[str], Log | None]:
     """What a file is, what a user may want to know of it, and a log; raises what is wrong."""
     if is_log(path):
         log = import_log(path)
@@ -129,7 +130,7 @@ def is_log(path: Path) -> bool:
     """True if a file is a log of a machine: by its ending, and by a reader that knows it."""
     if path.suffix.lower() not in LOG_SUFFIXES or not path.is_file() or is_grab_mat(path):
         return False
-    return detect_log(path) is not None
+    return bool(recognise(path)[0])
 
 
 def _mechanism_notes(path: Path) -> list[str]:

@@ -41,7 +41,7 @@ COMMANDS = (
     'cdpr plan acrobot_large --waypoints "0,0,0.2; 0.1,-0.1,0.3" --limits 1,60 --out plan',
     "cdpr plan acrobot_large --proven --from 0,0,0.2 --to 0.2,0.1,0.3 --out proven",
     "cdpr design acrobot_large --goal static --quick --out design",
-    "cdpr calibrate --campaign acrobot_sensors --out calibrate",
+    "cdpr calibrate-campaign acrobot_sensors --out calibrate",
     "cdpr study tension-methods --quick --out study",
 )  # fmt: skip
 """Each writes figures; a command that does not end well is named on the page."""

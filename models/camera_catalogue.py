@@ -1,6 +1,7 @@
 """The catalogue of cameras: what manufacturers publish, the pinhole model that follows, faults.
 
-Files of one's own, as `cdpr calibrate-camera` writes them, are the same, with what was calibrated.
+Files of your own, as `cdpr calibrate-camera` writes them, have the same fields, with what was
+calibrated; `camera_info` files of ROS and files of OpenCV's FileStorage are read too.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -10,10 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.camera_calibrations import read_calibration
 from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
 from cdpr_drake.schema.fields import array, number, optional_section, text, whole
 from cdpr_drake.schema.typed_yaml import closest, load_typed
-from cdpr_drake.vision.lens_distortion import COEFFICIENTS, NO_LENS, LensDistortion
+from cdpr_drake.vision.lens_distortion import COEFFICIENTS, FARTHEST, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
 
@@ -55,12 +57,20 @@ class Distortion:
 
 
 def fold_problem(pinhole: Pinhole) -> str:
-    """Words for a lens whose image folds over within the picture; empty where it does not."""
+    """Words for a lens whose image folds over, or that sees more than this package computes with,
+    within the picture; empty where neither is so."""
     share = pinhole.blind_share()
     if share == 0.0:
         return ""
     assert pinhole.distortion is not None
     angle = float(np.degrees(np.arctan(pinhole.distortion.valid_radius)))
+    if pinhole.distortion.valid_radius == FARTHEST:
+        return (
+            f"found a {pinhole.distortion.kind} lens that sees more than {angle:.1f} deg from the "
+            f"axis at {100.0 * share:.0f} % of the rim of its {pinhole.width} x {pinhole.height} "
+            "pixels, beyond what this package computes with; accepted: less than a half space, as "
+            "of an image that was cropped"
+        )
     return (
         f"found a {pinhole.distortion.kind} lens whose image folds over {angle:.1f} deg from the "
         f"axis, within the image of {pinhole.width} x {pinhole.height} pixels, of whose rim it "
@@ -181,9 +191,14 @@ def load_camera_file(path: Path) -> Camera:
     """Reads a camera's file.
 
     Raises:
-        RobotFileError: It cannot be read, or its lens folds its image over.
+        RobotFileError: It cannot be read, or its lens folds its image over or sees too much.
     """
-    camera = load_typed(Camera, path, error=RobotFileError)
+    calibration = None if path.parent == CAMERA_FOLDER else read_calibration(path)
+    if calibration is None:
+        camera = load_typed(Camera, path, error=RobotFileError)
+    else:
+        lens = calibration.pop("distortion")
+        camera = Camera(**calibration, distortion=None if lens is None else Distortion(**lens))
     if camera.principal_point is not None:
         u, v = camera.principal_point
         if not (-0.5 < u < camera.width - 0.5 and -0.5 < v < camera.height - 0.5):

@@ -9,7 +9,7 @@ from cdpr_drake.schema.input_files import input_there
 CAMERA_FOLDER = Path(__file__).parent / "cameras"
 """Of the catalogue."""
 
-CAMERA_SUFFIXES = (".yaml", ".yml")
+CAMERA_SUFFIXES = (".yaml", ".yml", ".xml")
 """Of files of cameras; what ends otherwise is a name of the catalogue."""
 
 

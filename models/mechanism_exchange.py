@@ -146,13 +146,13 @@ def import_mechanism(
             load_mechanism(Path(folder) / MECHANISM_FILE)
         except RobotFileError as problem:
             made = str(Path(folder) / MECHANISM_FILE)
-            told = str(problem).replace(made, str(bodies)) + _thin(tree)
+            told = str(problem).replace(made, str(bodies)) + _thin(tree, repair_inertia)
             raise RobotFileError(told) from problem
     return imported
 
 
-def _thin(tree: CasprTree) -> str:
-    """What might help where Drake refuses a tree: a word on links without thickness."""
+def _thin(tree: CasprTree, repaired: bool) -> str:
+    """What might help if Drake refuses a tree: a word on links without thickness or inertia."""
     found = [
         link.name
         for link in tree.links
@@ -160,6 +160,8 @@ def _thin(tree: CasprTree) -> str:
     ]
     if not found:
         return ""
+    if repaired:  # moments of 0 stay 0: nothing says how large the link is
+        return f"; accepted: moments of inertia above 0 in the file, of {', '.join(found)}"
     return f"; links without thickness, which --repair-inertia gives them: {', '.join(found)}"
 
 

@@ -21,8 +21,8 @@ from cdpr_drake.models.robot_parameters import (
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.json_text import load_json
 
-FILES = ("results.json", "identification.json")
-"""Files with a covariance in folders of `cdpr calibrate` and `cdpr identify`."""
+FILE = "results.json"
+"""File with a covariance in folders of `cdpr calibrate` and `cdpr identify`."""
 
 ROUNDED = 1e-8
 """How far below zero eigenvalues of a correlation matrix may lie, by rounding in its file."""
@@ -165,25 +165,25 @@ def _drawn(robot: Robot, names: tuple[str, ...], F: Array, random: np.random.Gen
 
 
 def _read(path: Path) -> ParameterCovariance:
-    files = [path / name for name in FILES] if path.is_dir() else [path]
-    for file in filter(Path.is_file, files):
-        try:
-            content: Any = load_json(file.read_text(encoding="utf-8"))
-        except (UnicodeDecodeError, json.JSONDecodeError) as problem:
-            raise DataFileError(f"{file}: found no JSON: {problem}") from None
-        try:
-            names = tuple(str(row["name"]) for row in content["parameters"])
-            table = np.array(content["covariance"], float)
-        except (KeyError, TypeError, ValueError):
-            raise DataFileError(
-                f"{file}: found no parameters with a covariance; accepted: "
-                f"{' or '.join(FILES)} of cdpr calibrate or cdpr identify"
-            ) from None
-        try:
-            return ParameterCovariance(names, table)
-        except DataFileError as problem:
-            raise DataFileError(f"{file}: {problem}") from None
-    raise DataFileError(
-        f"{path}: found no such file; accepted: {' or '.join(FILES)} of cdpr calibrate or cdpr "
-        "identify, or its folder"
-    )
+    file = path / FILE if path.is_dir() else path
+    if not file.is_file():
+        raise DataFileError(
+            f"{path}: found no such file; accepted: {FILE} of cdpr calibrate or cdpr identify, or "
+            "its folder"
+        )
+    try:
+        content: Any = load_json(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError) as problem:
+        raise DataFileError(f"{file}: found no JSON: {problem}") from None
+    try:
+        names = tuple(str(row["name"]) for row in content["parameters"])
+        table = np.array(content["covariance"], float)
+    except (KeyError, TypeError, ValueError):
+        raise DataFileError(
+            f"{file}: found no parameters with a covariance; accepted: {FILE} of cdpr calibrate or "
+            "cdpr identify"
+        ) from None
+    try:
+        return ParameterCovariance(names, table)
+    except DataFileError as problem:
+        raise DataFileError(f"{file}: {problem}") from None

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from cdpr_drake.analyses.frame.folder import foreign_files, read_marker
-from cdpr_drake.analyses.reporting.written_files import MARKER, others_in
+from cdpr_drake.analyses.frame.folder import foreign_files
+from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.analyses.runs.log import PARTS
 
 TOLD = re.compile(
@@ -72,8 +72,7 @@ def unknown_files(folder: Path) -> Iterator[str]:
     for marker in folder.rglob(MARKER):
         inside = marker.parent.relative_to(folder)
         if not any(part.startswith(".") for part in inside.parts):
-            other_files = foreign_files if read_marker(marker.parent) else others_in
-            for name in other_files(marker.parent):
+            for name in foreign_files(marker.parent):
                 yield f"{inside / name} is not known to be the program's"
 
 

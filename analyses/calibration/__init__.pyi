@@ -1,11 +1,2 @@
-from .calibration_campaign import run_campaign as run_campaign
-from .calibration_report import calibration_drawings as calibration_drawings
-from .calibration_task import Calibration as Calibration
-from .calibration_task import calibrate as calibrate
 from .free_motion import FreeMotionTask as FreeMotionTask
 from .free_motion import fit_free_motion as fit_free_motion
-from .identification_task import Identification as Identification
-from .identification_task import identify as identify
-from .identified_robots import dynamic_model as dynamic_model
-from .identified_robots import platform_size as platform_size
-from .pose_proposal import next_poses as next_poses

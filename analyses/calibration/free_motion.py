@@ -48,7 +48,7 @@ from cdpr_drake.analyses.calibration.free_motion_sensor import (
     unsensed_tensions,
 )
 from cdpr_drake.analyses.calibration.free_motion_start import StartCoordinates, moved_sizes
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError, IdentificationError
 from cdpr_drake.identification.parameters import MASS_GROUP
@@ -201,7 +201,7 @@ class FreeMotion:
     """
 
     task: FreeMotionTask
-    log: CalibrationLog
+    log: Measurements
     status: str
     model: FreeMotionModel
     unknowns: tuple[Unknown, ...]
@@ -218,7 +218,7 @@ class FreeMotion:
 
 
 def fit_free_motion(
-    task: FreeMotionTask, log: CalibrationLog, say: Callable[[str], object] = lambda _: None
+    task: FreeMotionTask, log: Measurements, say: Callable[[str], object] = lambda _: None
 ) -> FreeMotion:
     """Finds a robot's dynamics in a log of free motion.
 
@@ -293,7 +293,7 @@ def _spans(
 
 
 def _groups(
-    task: FreeMotionTask, log: CalibrationLog, stretches: Sequence[Stretch]
+    task: FreeMotionTask, log: Measurements, stretches: Sequence[Stretch]
 ) -> tuple[str, ...]:
     """Groups that are unknown: a mass needs tensions."""
     told = any(np.isfinite(s.tensions).any() for s in stretches)

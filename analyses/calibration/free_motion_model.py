@@ -15,7 +15,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import CableBehaviour, behaving_cables, behaviour_of
 from cdpr_drake.cables.models import ELASTIC, KELVIN_VOIGT
@@ -30,6 +29,7 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
 from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.identification.parameters import CENTER, DAMPING, MASS_GROUP, MOMENTS, STIFFNESS
+from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near

@@ -9,8 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.log_fit import wound_lengths
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -94,7 +93,7 @@ class Stretch:
         )  # fmt: skip
 
 
-def recorded_turns(log: CalibrationLog) -> Recorded:
+def recorded_turns(log: Measurements) -> Recorded:
     """Poses of a tracker, or turns of a sensor.
 
     Raises:
@@ -131,7 +130,7 @@ def recorded_turns(log: CalibrationLog) -> Recorded:
 
 
 def cut(
-    robot: Robot, log: CalibrationLog, recorded: Recorded, spans: Sequence[tuple[float, float]]
+    robot: Robot, log: Measurements, recorded: Recorded, spans: Sequence[tuple[float, float]]
 ) -> list[Stretch]:
     """Stretches of a log.
 
@@ -148,7 +147,7 @@ def cut(
     time, m = log.time, len(robot.cables)
     usual = float(np.median(np.diff(recorded.time)))
     rate = min(RATE, 1.0 / usual)
-    lengths = wound_lengths(robot, log)
+    lengths = log.wound(robot)
     made = []
     for start, end in spans:
         words = f"{log.path}: stretch {start:g}:{end:g}"

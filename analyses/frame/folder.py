@@ -25,13 +25,14 @@ from filelock import FileLock, Timeout
 
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
+from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.errors import OutputFolderError, StoppedError
 from cdpr_drake.schema.input_files import inputs_held
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.version import __version__
 
-MARKER, LOCK, PART = ".cdpr_drake.json", ".cdpr_drake.lock", ".part-"
-"""The marker, the lock, and what the name of a file in the making begins with."""
+LOCK, PART = ".cdpr_drake.lock", ".part-"
+"""The lock, and what the name of a file in the making begins with."""
 
 INPUTS = "inputs.json"
 """Files of users that the results follow from, with their SHA-256 and sizes [byte]."""
@@ -374,6 +375,12 @@ def write_result(
             "command goes on"
         )
     results.complete()
+
+
+def shown_path(folder: Path) -> Path:
+    """A path as users read it: from the working folder if it lies below."""
+    here = Path.cwd().resolve()
+    return folder.relative_to(here) if folder.is_relative_to(here) else folder
 
 
 def is_locked(folder: Path) -> bool:

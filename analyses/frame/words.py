@@ -88,6 +88,14 @@ def box(word: str) -> tuple[Array, Array]:
     return spans[:, 0], spans[:, 1]
 
 
+def whole_pair(word: str) -> tuple[int, int]:
+    """Two whole numbers, not negative, of a word such as 9x7."""
+    first, second = word.lower().split("x")
+    if not (first.strip().isdigit() and second.strip().isdigit()):
+        raise ValueError(word)
+    return int(first), int(second)
+
+
 def names(word: str) -> list[str]:
     """Names with commas between."""
     return [part.strip() for part in word.split(",")]

@@ -1,11 +1,8 @@
-"""Logs of real machines: read as recorders write them, converted, joined, checked, replayed.
+"""Logs of real machines: read as recorders write them, joined, bound to a robot, replayed.
 
-Readers by name (`LOG_READERS`) give a `RecordedLog`: columns with SI units in their headers, which
-`cdpr calibrate` and `cdpr identify` read. `commanded_` stands before what the machine was told,
-`estimated_` before what its controller believed. Nothing is guessed in silence: a log says which
-reader read it and why, and who told each unit.
-
-Sources: stand in the file of each format.
+`read_log` reads a file in one of the `DIALECTS` into a `Log`: a table with SI units in its names,
+and a ledger with a row for each column of the file: its unit and who said it, its name, or why it
+was left out. `read_measurements` binds it to a robot, for every command alike.
 """
 
 import lazy_loader

@@ -1,8 +1,8 @@
 """OptiTrack Motive's CSV: rigid bodies and markers over time.
 
 Above the rows stand a line of settings in pairs, and lines of types, names, identities and what
-each column is. Quaternions have their real part last. Where the settings name no `Length Units`, as
-in format version 1.1, the user has to.
+each column is. Quaternions have their real part last. If the settings name no `Length Units`, as in
+format version 1.1, the user has to.
 
 Source: OptiTrack, Data Export: CSV, docs.optitrack.com/motive/data-export/data-export-csv.
 """
@@ -14,202 +14,171 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.frames import axes_in_words, turned_columns
-from cdpr_drake.analyses.logs.log_request import LogRequest
-from cdpr_drake.analyses.logs.recorded_log import POSITION, QUATERNION, TIME, RecordedLog, settled
-from cdpr_drake.analyses.logs.text_tables import cell_table, log_text
-from cdpr_drake.analyses.reporting.exported_logs import Columns
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, numbers
+from cdpr_drake.analyses.logs.columns import PARTS, QUATERNION, SECONDS
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log
+from cdpr_drake.analyses.logs.text import Cells, read_cells
 from cdpr_drake.errors import LogFileError, accepted_names
 
-FIRST = "Format Version"
-
-_UNITS = {"meters": 1.0, "centimeters": 1e-2, "millimeters": 1e-3}
+FIRST, BODY, MARKER = "Format Version", "Rigid Body", "Marker"
+_UNITS = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 _MOST_HEAD = 12
 """Lines above the rows; there are seven or eight."""
 
 _TURN = 1e-2
-"""By how much the length of a quaternion may differ from 1."""
+"""Largest difference of the length of a quaternion from 1."""
+
+_POSITION = tuple(f"Position {axis}" for axis in "XYZ")
+_PARTS = {
+    BODY: (*_POSITION, *(f"Rotation {axis}" for axis in "XYZW")), MARKER: _POSITION,
+    "Rigid Body Marker": _POSITION,
+}  # fmt: skip
+"""Columns of a body or marker, by its type."""
+
+Groups = dict[tuple[str, str], dict[str, int]]
+"""Columns by type and name, and there by part and axis."""
 
 
 def knows_motive(head: str) -> str:
-    """Why a text is one of these; empty where it is not."""
+    """Recognises the first cell."""
     return f"its first cell is {FIRST!r}" if head.startswith(f"{FIRST},") else ""
 
 
-def read_motive(path: Path, asked: LogRequest) -> RecordedLog:
+def read_motive(path: Path, text: str, facts: Facts) -> Log:
     """Reads poses of the platform's rigid body, and markers that belong to no body.
 
     Raises:
-        LogFileError: It is no such file, does not say its unit, has no body or several, or a cell
-            is no number.
+        LogFileError: It does not say its unit, has no body or several, or a cell is no number.
     """
-    text = log_text(path)
-    why = knows_motive(text)
-    if not why:
-        raise LogFileError(f"{path}: found {text[:30]!r} at the top; accepted: {FIRST!r}")
     lines = text.split("\n")
     place = next((k for k, line in enumerate(lines[:_MOST_HEAD]) if line.startswith("Frame,")), -1)
     if place < 0:
         raise LogFileError(
             f"{path}: found no line that begins with Frame; accepted: one above rows"
         )
-    settings = _pairs(lines[0])
-    width = len(lines[place].split(","))
-    head = [_cells(line, width) for line in lines[1:place] if line.strip(", \t")]
-    types = next(
-        (row for row in head if any("Rigid Body" in c or c == "Marker" for c in row)), None
-    )
-    what = next((row for row in head if "Position" in row), None)
-    if types is None or what is None:
+    axes = _split(lines[place])
+    head = [(_split(line) + [""] * len(axes))[: len(axes)]
+            for line in lines[1:place] if line.strip(", \t")]  # fmt: skip
+    types = next((row for row in head if any(BODY in c or c == MARKER for c in row)), None)
+    parts = next((row for row in head if "Position" in row), None)
+    if types is None or parts is None:
         raise LogFileError(f"{path}: found no types or no Position above the rows; accepted: both")
+    pairs = _split(lines[0])
+    settings = dict(zip(pairs[::2], pairs[1::2], strict=False))
     if settings.get("Rotation Type", "Quaternion") != "Quaternion":
         raise LogFileError(
             f"{path}: Rotation Type: found {settings['Rotation Type']}; accepted: Quaternion"
         )
     names = head[min(head.index(types) + 1, len(head) - 1)]
-    axes = _cells(lines[place], width)
-    table = cell_table(path, text, ",", skip=place + 1)
-    if len(table.rows[0]) != width:
+    cells = read_cells(path, text, ",", skip=place + 1)
+    if len(cells.rows[0]) != len(axes):
         raise LogFileError(
-            f"{path}:{table.lines[0]}: found {len(table.rows[0])} cells; accepted: {width}"
+            f"{path}:{cells.lines[0]}: found {len(cells.rows[0])} cells; accepted: {len(axes)}"
         )
-    factor, unit = _unit(path, settings, asked)
-    groups = _groups(path, types, names, what, axes)
-    body = _body(path, groups, table.rows, asked)
-    wanted: dict[str, tuple[int, float]] = {TIME: (1, 1.0)}
+    unit, words = _unit(path, settings, facts)
+    groups = _groups(path, types, names, [f"{p} {a}" for p, a in zip(parts, axes, strict=True)])
+    body = _platform(path, groups, cells, facts)
+    wanted = {SECONDS: 1}
     if body:
-        for header, axis in zip(POSITION, "XYZ", strict=True):
-            wanted[header] = (groups["Rigid Body", body]["Position", axis], factor)
-        for header, axis in zip(QUATERNION, "WXYZ", strict=True):
-            wanted[header] = (groups["Rigid Body", body]["Rotation", axis], 1.0)
-    for (kind, name), of_axis in groups.items():
-        if kind == "Marker" and _is_used(table.rows, of_axis["Position", "X"]):
+        of_body = groups[BODY, body]
+        wanted |= {f"{axis.lower()}_{unit}": of_body[f"Position {axis}"] for axis in "XYZ"}
+        wanted |= {f"q{axis.lower()}": of_body[f"Rotation {axis}"] for axis in "WXYZ"}
+    for (kind, name), of_marker in groups.items():
+        if kind == MARKER and _rows_with(cells, of_marker[_POSITION[0]]):
             word = re.sub(r"\W+", "_", name).strip("_")
-            for header, axis in zip(POSITION, "XYZ", strict=True):
-                wanted[f"marker_{word}_{header}"] = (of_axis["Position", axis], factor)
-    columns: Columns = {
-        header: factor * np.array([table.number(k, j) for k in range(len(table.rows))])
-        for header, (j, factor) in wanted.items()
-    }
-    units = {"positions": unit}
-    if asked.R_WF is not None:
-        units["axes"] = axes_in_words(asked.R_WF)
-    _check_turns(path, columns, table.lines)
-    log = RecordedLog(
-        path, "motive", why, turned_columns(columns, asked.R_WF), units, _remarks(groups, body)
-    )
-    return settled(log, np.array(table.lines))
+            for axis in "XYZ":
+                header = f"marker_{word}_{axis.lower()}_{unit}"
+                wanted[header] = of_marker[f"Position {axis}"]
+    columns = {header: [row[j] for row in cells.rows] for header, j in wanted.items()}
+    if body:
+        q = np.array([numbers(columns[name])[0] for name in PARTS[QUATERNION]])
+        size = np.linalg.norm(q, axis=0)
+        if np.any(np.abs(size - 1.0) > _TURN):
+            k = int(np.argmax(np.abs(size - 1.0) > _TURN))
+            raise LogFileError(
+                f"{path}:{cells.lines[k]}: quaternion: found length {size[k]:.4g}; accepted: 1"
+            )
+    shown = [" ".join(filter(None, (names[j], parts[j], axes[j]))) for j in range(len(axes))]
+    return assemble(
+        path, "motive", knows_motive(text), list(columns.items()), facts, lines=cells.lines,
+        shown=[shown[j] for j in wanted.values()], units={"positions": words},
+        remarks=_remarks(groups, body),
+        left_out={shown[j]: LEFT_OUT for j in range(len(axes)) if j not in wanted.values()},
+    )  # fmt: skip
 
 
-def _cells(line: str, width: int) -> list[str]:
-    cells = [cell.strip().strip('"') for cell in line.split(",")]
-    return cells[:width] + [""] * (width - len(cells))
+def _split(line: str) -> list[str]:
+    return [cell.strip().strip('"') for cell in line.split(",")]
 
 
-def _pairs(line: str) -> dict[str, str]:
-    cells = [cell.strip() for cell in line.split(",")]
-    return dict(zip(cells[::2], cells[1::2], strict=False))
-
-
-def _unit(path: Path, settings: dict[str, str], asked: LogRequest) -> tuple[float, str]:
-    """Factor of lengths, and who said so."""
-    given, told = settings.get("Length Units", ""), asked.factor("length")
-    known = _UNITS.get(given.lower())
+def _unit(path: Path, settings: dict[str, str], facts: Facts) -> tuple[str, str]:
+    """Unit of lengths, and who said so."""
+    named, told = settings.get("Length Units", ""), facts.units.get("length")
+    known = _UNITS.get(named.lower())
     if known is None and told is None:
         raise LogFileError(
-            f"{path}: Length Units: found {given or 'none'}; {accepted_names(given, _UNITS)}, or "
-            "--unit length=m, mm or cm"
+            f"{path}: Length Units: found {named or 'none'}; {accepted_names(named, _UNITS)}, or "
+            "use unit length=m, mm or cm"
         )
-    if known is not None and told is not None and known != told:
+    if known is not None and told not in (None, known):
         raise LogFileError(
-            f"{path}: Length Units: found {given}, and {asked.units['length']} told by --unit; "
-            "accepted: one of them"
+            f"{path}: Length Units: found {named}, and {told} with unit; accepted: one of them"
         )
     if known is not None:
-        return known, f"{given.lower()} by the file's Length Units"
-    return float(told or 1.0), f"{asked.units['length']}, as told"
+        return known, f"{named.lower()} by the file's Length Units"
+    return str(told), f"{told}, {AS_TOLD}"
 
 
-_POSITION = tuple(("Position", axis) for axis in "XYZ")
-_COLUMNS = {
-    "Rigid Body": (*_POSITION, *(("Rotation", axis) for axis in "XYZW")),
-    "Marker": _POSITION,
-    "Rigid Body Marker": _POSITION,
-}
-"""Columns that a body or marker has, by its type."""
-
-
-def _groups(
-    path: Path, types: list[str], names: list[str], what: list[str], axes: list[str]
-) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
-    """Columns by type and name of their body, and there by Rotation or Position and axis.
+def _groups(path: Path, types: list[str], names: list[str], parts: list[str]) -> Groups:
+    """Columns of each body and marker.
 
     Raises:
         LogFileError: A body or a marker has some of its columns only.
     """
-    found: dict[tuple[str, str], dict[tuple[str, str], int]] = {}
-    for j, (kind, name, part, axis) in enumerate(zip(types, names, what, axes, strict=True)):
-        if j > 1 and (part, axis) in _COLUMNS.get(kind, ()):
-            found.setdefault((kind, name), {}).setdefault((part, axis), j)
-    for (kind, name), parts in found.items():
-        missing = [f"{part} {axis}" for part, axis in _COLUMNS[kind] if (part, axis) not in parts]
+    groups: Groups = {}
+    for j, (kind, name, part) in enumerate(zip(types, names, parts, strict=True)):
+        if j > 1 and part in _PARTS.get(kind, ()):
+            groups.setdefault((kind, name), {}).setdefault(part, j)
+    for (kind, name), present in groups.items():
+        missing = [part for part in _PARTS[kind] if part not in present]
         if missing:
-            whole = ", ".join(f"{part} {axis}" for part, axis in _COLUMNS[kind])
             raise LogFileError(
-                f"{path}: {kind} {name!r}: found no column {', '.join(missing)}; accepted: {whole}"
+                f"{path}: {kind} {name!r}: found no column {', '.join(missing)}; accepted: "
+                f"{', '.join(_PARTS[kind])}"
             )
-    return found
+    return groups
 
 
-def _is_used(rows: list[list[str]], column: int) -> bool:
-    return any(row[column] for row in rows)
+def _rows_with(cells: Cells, column: int) -> int:
+    """Number of rows that have something in a column."""
+    return sum(1 for row in cells.rows if row[column])
 
 
-def _body(
-    path: Path, groups: dict[tuple[str, str], dict[tuple[str, str], int]],
-    rows: list[list[str]], asked: LogRequest,
-) -> str:  # fmt: skip
+def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:
     """Name of the rigid body that is the platform; empty where there are markers alone."""
     bodies = {
-        name: sum(1 for row in rows if row[parts["Position", "X"]])
-        for (kind, name), parts in groups.items()
-        if kind == "Rigid Body"
-    }
-    told = ", ".join(f"{name!r} ({count} rows)" for name, count in bodies.items())
-    if asked.body is not None:
-        if asked.body not in bodies:
-            raise LogFileError(f"{path}: body: found {asked.body!r}; accepted: {told or 'none'}")
-        return asked.body
-    seen = [name for name, count in bodies.items() if count]
-    if len(seen) > 1:
-        raise LogFileError(f"{path}: body: found {told}; accepted: one of them by --body")
-    if not seen and not any(kind == "Marker" for kind, _ in groups):
+        name: _rows_with(cells, present[_POSITION[0]])
+        for (kind, name), present in groups.items() if kind == BODY
+    }  # fmt: skip
+    words = ", ".join(f"{name!r} ({count} rows)" for name, count in bodies.items())
+    if facts.body is not None:
+        if facts.body not in bodies:
+            raise LogFileError(f"{path}: body: found {facts.body!r}; accepted: {words or 'none'}")
+        return facts.body
+    visible = [name for name, count in bodies.items() if count]
+    if len(visible) > 1:
+        raise LogFileError(f"{path}: body: found {words}; accepted: one of them; use body")
+    if not visible and not any(kind == MARKER for kind, _ in groups):
         raise LogFileError(f"{path}: found no rigid body and no marker; accepted: one at least")
-    return seen[0] if seen else ""
+    return visible[0] if visible else ""
 
 
-def _check_turns(path: Path, columns: Columns, lines: list[int]) -> None:
-    if QUATERNION[0] not in columns:
-        return
-    size: Array = np.linalg.norm([columns[name] for name in QUATERNION], axis=0)
-    off = np.abs(size - 1.0) > _TURN
-    if off.any():
-        k = int(np.argmax(off))
-        raise LogFileError(
-            f"{path}:{lines[k]}: quaternion: found length {size[k]:.4g}; accepted: 1"
-        )
-
-
-def _remarks(
-    groups: dict[tuple[str, str], dict[tuple[str, str], int]], body: str
-) -> tuple[str, ...]:
-    said = [f"the platform is the rigid body {body!r}"] if body else ["no rigid body: markers only"]
+def _remarks(groups: Groups, body: str) -> list[str]:
+    remarks = [
+        f"the platform is the rigid body {body!r}" if body else "no rigid body: markers only"
+    ]
     parts = sum(1 for kind, _ in groups if kind == "Rigid Body Marker")
-    others = [n for kind, n in groups if kind == "Rigid Body" and n != body]
-    if parts:
-        said.append(f"{parts} markers that make up rigid bodies were left out")
-    if others:
-        said.append(f"other rigid bodies were left out: {', '.join(others)}")
-    return tuple(said)
+    others = [name for kind, name in groups if kind == BODY and name != body]
+    remarks += [f"{parts} markers that make up rigid bodies were left out"] if parts else []
+    return remarks + ([f"other rigid bodies were left out: {', '.join(others)}"] if others else [])

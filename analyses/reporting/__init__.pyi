@@ -3,5 +3,4 @@ from .exported_logs import LOG_WRITERS as LOG_WRITERS
 from .log_files import finite as finite
 from .log_files import write_json as write_json
 from .log_files import write_whole as write_whole
-from .output_folder import results_folder as results_folder
 from .written_files import whole_file as whole_file

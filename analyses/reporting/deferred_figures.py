@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from cdpr_drake.analyses.reporting.log_files import write_whole
-from cdpr_drake.analyses.reporting.written_files import DRAWING, claim, whole_file
+from cdpr_drake.analyses.reporting.written_files import whole_file
 
 Pictures = dict[str, Callable[[Path], object]]
 """What writes a file to a path, by the name of the file."""
@@ -36,7 +35,6 @@ def write_pictures(
         Of each that could not be written, the name and why, in one line.
     """
     failed: dict[str, str] = {}
-    claim(*(folder / name for name in pictures))
     makers = [getattr(write, "__self__", None) for write in pictures.values()]
     with _young_garbage():
         for (name, write), maker, next_one in zip(
@@ -57,18 +55,6 @@ def write_pictures(
             if maker is None or maker is not next_one:  # else the same figure in another format
                 gc.collect(0)  # figures refer to themselves; those of hours hold 100 MB
     return failed
-
-
-@contextmanager
-def drawing(folder: Path, should_stop: Callable[[], bool] | None = None) -> Iterator[None]:
-    """Marks a folder of complete data as one whose pictures are drawn inside the block.
-
-    The mark stays where the block is ended or asked to stop, so that they can be completed.
-    """
-    write_whole(folder / DRAWING, "")
-    yield
-    if should_stop is None or not should_stop():
-        (folder / DRAWING).unlink()
 
 
 MOST_NEW = 2_000_000

@@ -119,7 +119,7 @@ def write_run_inputs(folder: Path, scenario: Any, robot: Robot) -> None:
     for section, key in ((camera, "model"), (perturbations, "camera_model")):
         file = getattr(section, key, None)
         if file is not None and file.lower().endswith(CAMERA_SUFFIXES):
-            name = f"{key}.yaml"
+            name = f"{key}{Path(file).suffix}"
             _copy(Path(file), folder / name)
             where = "camera" if section is camera else "perturbations"
             setattr(written, where, replace(getattr(written, where), **{key: name}))

@@ -19,12 +19,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 
 from cdpr_drake.analyses.frame.figures import figure_writers
-from cdpr_drake.analyses.frame.folder import Folder
+from cdpr_drake.analyses.frame.folder import Folder, shown_path
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.result import STOPPED, Result, Table
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.provenance import (
     code_version,
     package_versions,

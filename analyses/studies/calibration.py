@@ -18,12 +18,12 @@ from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 from scipy.stats import chi2
 
-from cdpr_drake.analyses.calibration.calibrated_robots import calibrated_robot, calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
-from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.candidate_poses import rest_poses
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits.calibration import fit_robot
+from cdpr_drake.analyses.fits.poses import rest_poses
+from cdpr_drake.analyses.fits.robots import calibrated_robot, calibration_model
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.studies.facts import MissingRuns
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
@@ -295,7 +295,7 @@ def start_row(seed: int) -> dict[str, Any]:
     lengths = Point(true, Stations.at(poses)).numbers[:, :, 0]
     noisy = lengths * (1.0 + LENGTH_SHARE * random.standard_normal(lengths.shape))
     counted = (noisy - lengths[0]) / (1.0 + tensions / robot.stiffness())
-    log = CalibrationLog(
+    log = Measurements(
         Path("simulated"), START_POSES, lengths=counted,
         tensions=tensions + TENSION_SIGMA * random.standard_normal(tensions.shape),
     )  # fmt: skip
@@ -307,8 +307,11 @@ def start_row(seed: int) -> dict[str, Any]:
     sigmas = Sigmas(
         lengths=1e-6, lengths_share=LENGTH_SHARE, tensions=TENSION_SIGMA, moments=5e-3, forces=5e-2
     )
-    task = CalibrationTask(robot, ("length_offsets",), sigmas=sigmas, start=wrong, outliers=False)
-    result = calibrate(task, log).result
+    task = CalibrationTask(
+        robot=robot, log=log, unknown=("length_offsets",), sigmas=sigmas, start=wrong,
+        outliers=False,
+    )  # fmt: skip
+    result = fit_robot(task).result
     turn, place = result.pose_std[0]
     distance, angle = pose_error(poses[0], result.stations.poses()[0])
     return {

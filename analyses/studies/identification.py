@@ -16,12 +16,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.identification_campaign import (
+from cdpr_drake.analyses.fits.identify_campaign import (
     campaign_robots,
     excitation_task,
-    run_dynamic_campaign,
+    simulate_campaign,
 )
-from cdpr_drake.analyses.calibration.identified_robots import dynamic_model, platform_size
 from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.studies.calibration import by_degrees, draw_chi_square
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, select
@@ -34,6 +33,7 @@ from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor
 from cdpr_drake.identification.samples import LoggedMotion, sample_motion
+from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, nth_look
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -140,7 +140,7 @@ def campaign_row(seed: int) -> dict[str, Any]:
     """
     loaded = load_scenario(SCENARIO, (f"seed={seed}",))
     assert isinstance(loaded, TensionScenario)
-    run = run_dynamic_campaign(loaded)
+    run = simulate_campaign(loaded)
     result, both = run.identification.result, run.identification
     assert both.validated is not None
     fitted, validated = (

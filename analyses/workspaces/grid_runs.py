@@ -12,12 +12,11 @@ from typing import Any, Self
 
 import numpy as np
 
-from cdpr_drake.analyses.frame.folder import Folder, load_arrays
+from cdpr_drake.analyses.frame.folder import Folder, load_arrays, shown_path
 from cdpr_drake.analyses.frame.follow import Count, Follow
 from cdpr_drake.analyses.frame.job import FinishedJob
 from cdpr_drake.analyses.frame.result import STOPPED, Result
 from cdpr_drake.analyses.reporting.deferred_figures import Pictures
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, DataFileError, StoppedError, SweepError

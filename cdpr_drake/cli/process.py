@@ -32,9 +32,6 @@ INCOMPLETE = 3
 STUDY_FAILED = 5
 """Exit code of a reproduction of which a study failed; the report says which."""
 
-MISFIT = 6
-"""Exit code of a calibration or an identification that does not fit what was measured."""
-
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 """What asks to stop."""
 

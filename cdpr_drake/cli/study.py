@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import free_folder
+from cdpr_drake.analyses.frame.folder import free_folder, shown_path
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.words import (
     Formats,
     Names,
@@ -19,15 +21,72 @@ from cdpr_drake.analyses.frame.words import (
     one_of,
     whole,
 )
-from cdpr_drake.analyses.reporting.output_folder import shown_path
 from cdpr_drake.analyses.reporting.tables import frame_table
 from cdpr_drake.analyses.studies.report import print_pdf
 from cdpr_drake.analyses.studies.report import reproduce as reproduce_all
 from cdpr_drake.analyses.studies.study import MOST_SEEDS, STUDIES, Form, arguments_of, run_study
 from cdpr_drake.cli.process import INCOMPLETE, INTERRUPTED, STUDY_FAILED
-from cdpr_drake.cli.sessions import Answer, failures
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Following = Annotated[Follow, Parameter(parse=False)]
+
+
+@dataclass(frozen=True, repr=False, kw_only=True)
+class Answer(Result):
+    """What a command shows of a result that is no `Result` itself.
+
+    Attributes:
+        numbers: For JSON.
+        printed: Tables of rich, and words.
+        words: Sentences on what was missing or stopped.
+        code: Exit code.
+        failed: Of each file that could not be written, its path and why.
+        drawing: Draws it, if it can be drawn.
+    """
+
+    numbers: Any
+    printed: Sequence[Any] = ()
+    words: Sequence[str] = ()
+    code: int = 0
+    failed: Mapping[str, str] = field(default_factory=dict)
+    drawing: Callable[[], Figure] | None = None
+
+    def as_dict(self) -> Any:
+        """For JSON."""
+        return self.numbers
+
+    def tables(self) -> Sequence[Table]:
+        """None that are made of words."""
+        return ()
+
+    def lines(self) -> Sequence[str]:
+        """Words among what is printed."""
+        return [item for item in self.printed if isinstance(item, str)]
+
+    def notes(self) -> Sequence[str]:
+        """On what was missing or stopped."""
+        return self.words
+
+    def figures(self) -> Mapping[str, Callable[[], Figure]]:
+        """What draws it."""
+        return {} if self.drawing is None else {"result": self.drawing}
+
+    @property
+    def exit_code(self) -> int:
+        """As the command has it."""
+        return self.code
+
+    def show(self, console: Any) -> None:
+        """Prints tables and words in their order."""
+        for item in self.printed:
+            console.print(item, soft_wrap=isinstance(item, str), highlight=False)
+
+
+def failures(failed: Mapping[str, str], folder: Path | None) -> dict[str, str]:
+    """Paths of files that could not be written, and why."""
+    return {str(name if folder is None else folder / name): why for name, why in failed.items()}
 
 
 def study(

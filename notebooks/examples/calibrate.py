@@ -7,5 +7,5 @@ import cdpr_drake as cdpr
 
 wrong = ["perturbations.exit_points=0.01", "perturbations.anchor_points=0.005"]
 scenario = cdpr.load_scenario("acrobot_pbvs_line", ["camera.kind=projected", *wrong])
-found = cdpr.calibrate_in_simulation(scenario, 12)
+found = cdpr.calibrate_campaign(scenario, poses=12)
 print(found)

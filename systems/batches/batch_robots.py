@@ -191,8 +191,8 @@ class BatchRobots:
             robot: The robot in the middle, as the file `robot.yaml` that `cdpr calibrate` or
                 `cdpr identify` wrote.
             count: Number of robots.
-            covariance: Of its parameters: such a folder, its results.json or identification.json, a
-                result, or a `ParameterCovariance`.
+            covariance: Of its parameters: such a folder, its results.json, a result, or a
+                `ParameterCovariance`.
             seed: Of the random numbers; robot k is the same whatever the count.
             how: As for `BatchRobots`: settings, rule, by_tensions, threads.
 

@@ -67,18 +67,15 @@ digit from call to call; another set of images would change them by whole deviat
 
 
 def test_pictures_give_what_the_command_writes_of_files(images, calibrated):
-    board = cdpr.CalibrationBoard("charuco", 9, 7, 0.035)
     pictures = [cv2.imread(name) for name in images]
-    found = cdpr.calibrate_camera(pictures, board, name="mine", rate=25.0)
-    assert found.folder is None
-    assert (found.camera.name, found.camera.rate_hz) == ("mine", 25.0)
-    assert "held out" in repr(found)
-    assert len(found.tables()) == 4
+    fit = cdpr.calibrate_camera(pictures, squares=(9, 7), size=0.035, name="mine", rate=25.0)
+    assert fit.folder is None
+    assert (fit.model.name, fit.model.rate_hz) == ("mine", 25.0)
+    assert "held out" in repr(fit)
+    assert len(fit.tables()) == 4
     rows = json.loads((calibrated / "results.json").read_text(encoding="utf-8"))["parameters"]
-    apart = np.abs(found.fit.values - [row["value"] for row in rows]) / found.fit.deviations
-    assert np.max(apart) < SAME
-    with pytest.raises(cdpr.CdprError, match="sharp: unknown"):
-        cdpr.calibrate_camera(images, board, sharp=True)
+    apart = [abs(u.value - row["value"]) / u.std for u, row in zip(fit.unknowns, rows, strict=True)]
+    assert max(apart) < SAME
 
 
 def test_what_gives_no_camera_is_refused(images, tmp_path, capsys):

@@ -135,7 +135,7 @@ SAID = {
     "adaptation": learns_points,
     "basin": converges_where_certified,
     "calibrate": lambda out: np.all(
-        np.diff(numbers(r"([\d.]+) mm off before, ([\d.]+)", out)) < 0.0
+        np.diff(numbers(r"(?:exit|anchor) points +([\d.]+) +([\d.]+)", out)) < 0.0
     ),
     "design": lambda out: len(
         numbers(r"(?:wrench-feasible|csw) +([\d.]+) +([\d.]+) +(?:m\^3|share)", out)

@@ -41,15 +41,12 @@ LONG_WORK = {
     ],
     "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.results_folder"],
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],
-    "calibrate": [
-        "cdpr_drake.analyses.front.calibration.calibrate_log",
-        "cdpr_drake.analyses.front.simulated_fits.run_campaign",
-    ],
-    "calibrate-camera": ["cdpr_drake.analyses.front.camera_calibration.find_boards"],
-    "identify": [
-        "cdpr_drake.analyses.front.calibration.identify_log",
-        "cdpr_drake.analyses.front.simulated_fits.run_dynamic_campaign",
-    ],
+    "calibrate": ["cdpr_drake.analyses.fits.calibration.fit_robot"],
+    "calibrate-campaign": ["cdpr_drake.analyses.fits.campaign.kept_fit"],
+    "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
+    "identify-swings": ["cdpr_drake.analyses.fits.swings.fit_free_motion"],
+    "identify": ["cdpr_drake.analyses.fits.identification.fit_dynamics"],
+    "identify-campaign": ["cdpr_drake.analyses.fits.identify_campaign.simulate_campaign"],
     "scenarios": ["cdpr_drake.systems.diagrams.load.load_scenario"],
     "study": ["cdpr_drake.analyses.studies.study.finished_jobs"],
     "reproduce": ["cdpr_drake.analyses.studies.study.finished_jobs"],
@@ -96,7 +93,12 @@ def prepare(words, folder):
         (folder / name).write_text(OWN_ROBOT.read_text())
     for word in words[2:]:
         path = folder / word
-        if word.endswith(".csv") and words[1] in ("calibrate", "identify", "replay"):
+        if word.endswith(".csv") and words[1] in (
+            "calibrate",
+            "identify",
+            "identify-swings",
+            "replay",
+        ):
             path.write_text(lengths_log(named_robot(words, folder)))
     files = {
         "series.txt": hangprinter_script,

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration.identified_robots import dynamic_model
+from cdpr_drake.models.robot_dynamics import dynamic_model
 from cdpr_drake.models.robot_loader import load_robot
 from tests.cli.commands import refuse, run, told, write_log
 from tests.identification.logs import TRUE, log
@@ -34,7 +34,7 @@ def identify(path, out="out"):
 def test_a_log_identifies_and_another_one_validates(tmp_path, logs, capsys):
     out = tmp_path / "out"
     said = told(capsys, *identify(logs[0], out), "--validate", logs[1])
-    assert said == json.loads((out / "identification.json").read_text())
+    assert said == json.loads((out / "results.json").read_text())
     assert (out / "validation.png").exists()
     assert said["status"] == "optimal"
     mass = said["parameters"][0]
@@ -60,8 +60,9 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(tmp_path, capsy
     path, out = write(tmp_path / "log.csv", time, poses, tensions), tmp_path / "out"
     code, words, err = run(capsys, *identify(path, out))
     assert code == 6
-    assert "not written: [Errno 28]" in err
-    said = json.loads((out / "identification.json").read_text())
+    assert "validation.png: not written: " in err
+    assert "No space left" in err
+    said = json.loads((out / "results.json").read_text())
     assert said["status"] == "misfit"
     assert said["residuals_over_sigma"] > said["misfit_factor"] == 3.0
     most = said["largest_residuals"][0]

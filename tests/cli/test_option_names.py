@@ -2,9 +2,9 @@
 
 import pytest
 
+from cdpr_drake.analyses.fits.calibration import calibrate
+from cdpr_drake.analyses.fits.campaign import calibrate_campaign
 from cdpr_drake.analyses.frame.follow import NOBODY
-from cdpr_drake.analyses.front.calibration import calibrate
-from cdpr_drake.analyses.front.simulated_fits import calibrate_in_simulation, identify_in_simulation
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.studies.study import run_study
@@ -54,10 +54,9 @@ NOWHERE = "192.0.2.1"
         (lambda: calibrate("planar", "log.csv", tags="tags.csv", tag_size=0.1),
          ["calibrate", "planar", "log.csv", "--tags", "tags.csv", "--tag-size", "0.1"],
          "tag_size: found beside tags", "--tag-size: found beside tags"),
-        (lambda: calibrate_in_simulation(TORQUES), ["calibrate", "--campaign", TORQUES],
-         f"scenario: found {TORQUES}", f"--campaign: found {TORQUES}"),
-        (lambda: identify_in_simulation(SCENARIO), ["identify", "--campaign", SCENARIO],
-         f"scenario: found {SCENARIO}", f"--campaign: found {SCENARIO}"),
+        (lambda: calibrate_campaign(SCENARIO, poses=6, poses_from="x.csv"),
+         ["calibrate-campaign", SCENARIO, "--poses", "6", "--poses-from", "x.csv"],
+         "poses: found beside poses_from", "--poses: found beside --poses-from"),
     ],
 )  # fmt: skip
 def test_python_reads_arguments_and_the_command_options(

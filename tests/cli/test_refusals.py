@@ -231,7 +231,7 @@ REFUSED = {
         ("--unknown exits", "--unknown: found 'exits'; accepted: exit_points"),
         ("--sigma length=1", "--sigma: found 'length=1'; accepted: name=number", "lengths_share"),
         ("--prior exit_points=-1", "--prior: found 'exit_points=-1'"),
-        ("--poses-from x", "--poses-from: found without --campaign"),
+        ("--campaign acrobot_sensors", "--campaign"),
     ],
     "calibrate-camera mine.yaml --board charuco": [
         ("--squares 9x7 --size 0.03", "mine.yaml: found no image"),

@@ -34,9 +34,10 @@ OPTIONS = [
 ]  # fmt: skip
 ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
-    "--host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out",
-    "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
-    "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
+    "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
+    "--out", "--parameters", "--path", "--picture", "--poses-from", "--rails", "--reactions",
+    "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut", "--unknown",
+    "--validate", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
@@ -98,13 +99,14 @@ def test_a_docstring_has_a_line_for_each_argument(verb, name):
     assert missing == []
 
 
-SETTINGS = ("DesignSettings", "ProofSettings")
-"""Public classes of settings: the schema of a file, and what `ProvenSets` are made with."""
+SETTINGS = ("CalibrationTask", "DesignSettings", "ProofSettings")
+"""Public classes: a log and its unknowns, which trials of signs and of rows change; the schema of a
+file; what `ProvenSets` are made with."""
 
 CARRIED = 5
 """So many fields of a class may have the name of an option by chance."""
 
-TYPES = ("Parameter", "words", "one_of", "_names")
+TYPES = ("Parameter", "words", "one_of", "_names", "whole", "named_values")
 """What makes types of arguments, which may name options."""
 
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import cv2
 import pytest
 
-from cdpr_drake.analyses.reporting.written_files import DRAWING
 from cdpr_drake.schema.yaml_files import load_yaml
 from tests.cli.commands import ended, refuse
 from tests.cli.test_calibrate_camera import BOARD, LENS, K
@@ -64,21 +63,16 @@ def told(name):
 
 
 @pytest.mark.parametrize("asked", [fitted, seen])
-def test_a_fit_that_ends_while_its_figures_are_drawn_is_made_again(asked, here, monkeypatch):
+def test_a_fit_that_stops_before_its_figures_keeps_its_numbers(asked, here, monkeypatch, capsys):
     words = asked(here)
     with monkeypatch.context() as patch:
-        figures = "cdpr_drake.analyses.frame.figures.write_pictures"
-        patch.setattr(figures, end_at_once)
+        patch.setattr("cdpr_drake.analyses.frame.figures.figure_writers", end_at_once)
         with pytest.raises(Ended):
             ended(*words)
-    there = sorted(os.listdir("fit"))
-    assert DRAWING in there  # and the numbers, which no figure can cost
-    numbers = {name: told(name) for name in there if name.endswith((".json", ".yaml"))}
-    assert len(numbers) == 3
+    names = [name for name in os.listdir("fit") if name.endswith((".json", ".yaml"))]
+    numbers = {name: told(name) for name in names if not name.startswith(".")}
+    assert len(numbers) == 2
     assert ended(*words) == 0
-    made = os.listdir("fit")
-    assert any(name.endswith(".png") for name in made)
-    assert DRAWING not in made
+    assert any(name.endswith(".png") for name in os.listdir("fit"))
     assert {name: told(name) for name in numbers} == numbers
-    assert [name for name in os.listdir(".") if name.startswith("fit")] == ["fit"]
-    assert ended(*words) == 2  # what is complete is not touched
+    assert "--overwrite" in refuse(capsys, *words)

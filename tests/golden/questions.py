@@ -36,11 +36,13 @@ QUESTIONS = {
         "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz] --bound tracker.[xyz]=0.001 "
         "--hold-out 8-9 --keep-outliers"
     ),
-    "calibrate/campaign": "calibrate --campaign acrobot_sensors --poses 8 --next 3",
+    "calibrate/campaign": "calibrate-campaign acrobot_sensors --poses 8 --next 3",
     "identify/motion": "identify acrobot_large motion.csv --validate motion_2.csv --no-pulleys",
     "identify/pulleys": "identify acrobot_large motion.csv",
-    "identify/free": "identify believed.yaml swings.csv --free 0:2.39 --hold-out 3.39:5.78",
-    "identify/campaign": "identify --campaign acrobot_computed_torque",
+    "identify/free": (
+        "identify-swings believed.yaml swings.csv --stretches 0:2.39 --hold-out 3.39:5.78"
+    ),
+    "identify/campaign": "identify-campaign acrobot_computed_torque",
     "calibrate-camera/charuco": f"calibrate-camera {CHARUCO} empty.png --board charuco {BOARD}",
     "calibrate-camera/chessboard": (
         f"calibrate-camera {CHESSBOARD} --board chessboard {BOARD} --model rational --keep-outliers"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from cdpr_drake.analyses.front.logs import replay_log
+from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.cli.app import main
 from tests.studio.pages import held_page
 from tests.studio.served import served
@@ -56,7 +56,7 @@ def computed(tmp_path_factory):
 def beside(alone, tmp_path_factory):
     """The log of that run beside the model, as the command leaves it."""
     folder = tmp_path_factory.mktemp("work") / "logs" / "small"
-    replay_log(alone / "log.csv", "acrobot_small", folder=folder)
+    replay_log(alone / "log.csv", robot="acrobot_small", out=folder)
     return folder
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 from selenium.webdriver.common.keys import Keys
 
-from cdpr_drake.analyses.front.logs import replay_log
+from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.workbench.command_board import ABOUT
@@ -65,7 +65,7 @@ def fill(folder: Path) -> None:
     run = folder / "runs" / "acrobot_pbvs"
     scenario = load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"])
     simulate(scenario, folder=run)
-    replay_log(run / "log.csv", "acrobot_small", folder=folder / "logs" / "acrobot_pbvs")
+    replay_log(run / "log.csv", robot="acrobot_small", out=folder / "logs" / "acrobot_pbvs")
     about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
     (folder / "logs" / f".acrobot_pbvs{ABOUT}").write_text(json.dumps(about))
 

@@ -6,7 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.front.logs import import_log
+from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
@@ -44,10 +44,10 @@ def work(tmp_path_factory):
 
 
 def test_contents_are_those_of_the_front_door(work):
-    found, log = log_contents(work / "circle.csv"), import_log(work / "circle.csv").log
-    assert dict(found.facts)["rows"] == log.row_report().words()
+    found, log = log_contents(work / "circle.csv"), import_log(work / "circle.csv")
+    assert dict(found.facts)["rows"] == log.rows_words()
     assert "1 gaps" in dict(found.facts)["rows"]
-    assert [row[0] for row in found.columns] == list(log.columns)
+    assert [row[0] for row in found.columns] == list(log.frame)
     assert [row[1] for row in found.columns][:2] == ["s", "m"]
     assert found.picture.startswith(b"\x89PNG")
 

@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 
 from nicegui import run, ui
 
-from cdpr_drake.analyses.logs.log_formats import AUTO, LOG_READERS
+from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.moving_plots import MovingPlots
@@ -91,7 +91,7 @@ class _LogsPanel:
         self._contents = ui.element("div").classes("w-full").mark("log-contents")
         self._fields = CommandFields(
             bench.commands["replay"], view.filled, FIRST,
-            {"log-format": Choices([*LOG_READERS, AUTO])}, bench.folder,
+            {"log-format": Choices([*DIALECTS, AUTO])}, bench.folder,
         )  # fmt: skip
         self._bar = JobBar(view.board, "comparisons")
         self._body = ui.element("div").classes("w-full cdpr-run").mark("comparison")

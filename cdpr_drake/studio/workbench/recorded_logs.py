@@ -14,16 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.front.logs import import_log
-from cdpr_drake.analyses.logs.log_replay import SUMMARY, TABLE
-from cdpr_drake.analyses.logs.recorded_log import (
-    LENGTH,
-    POSITION,
-    TENSION,
-    TIME,
-    RecordedLog,
-    quantity,
-)
+from cdpr_drake.analyses.logs.columns import LENGTH, PARTS, POSITION, SECONDS, TENSION
+from cdpr_drake.analyses.logs.import_log import import_log
+from cdpr_drake.analyses.logs.log import Log, unit_of
+from cdpr_drake.analyses.logs.replay import SUMMARY, TABLE
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
@@ -72,26 +66,23 @@ def log_contents(path: Path) -> LogContents:
     Raises:
         LogFileError: No reader knows it, or it is damaged; one line.
     """
-    found = import_log(path)
-    log = found.log
+    log = import_log(path)
     picture = io.BytesIO()
-    found.plot().savefig(picture, format="png", dpi=DOTS)
-    title, facts = log.summary()
-    if found.joined is not None:
-        facts = [("clocks", found.joined.words()), *facts]
-    told = dict(facts) | {"columns": f"{len(log.columns)}, in the table below"}
-    notes = [words for what, words in facts if what == "note"]
-    told.pop("note", None)
-    rows = [("log", title), *told.items(), *(("note", words) for words in notes)]
-    return LogContents(tuple(rows), _columns(log), picture.getvalue())
+    log.plot().savefig(picture, format="png", dpi=DOTS)
+    facts = [
+        ("log", f"Log {log.path.name}, {log.dialect}"), ("read so", log.why),
+        ("rows", log.rows_words()), ("columns", f"{len(log.frame.columns)}, in the table below"),
+        *log.units.items(), *(("note", words) for words in log.remarks),
+    ]  # fmt: skip
+    return LogContents(tuple(facts), _columns(log), picture.getvalue())
 
 
-def _columns(log: RecordedLog) -> tuple[tuple[str, ...], ...]:
-    rows, found = log.count, log.as_dict()["columns"]
+def _columns(log: Log) -> tuple[tuple[str, ...], ...]:
+    rows, found = len(log.frame), log.as_dict()["columns"]
     return tuple(
         (
             header,
-            "s" if header == TIME else quantity(header) or "–",
+            unit_of(header) or "–",
             str(about["rows"]),
             str(rows - about["rows"]),
             *("–" if value is None else f"{value:.5g}" for value in _range(about)),
@@ -183,12 +174,12 @@ def _compared(summary: Mapping[str, Any], table: Mapping[str, Array]) -> Compari
     add("cable length [m]", of_cables(LENGTH))
     add("tension [N]", of_cables(TENSION))
     places = []
-    for k, header in enumerate(POSITION):
+    for k, header in enumerate(PARTS[POSITION]):
         axis, look = header[0], nth_look(k)
         places.append((axis, look, table[header]))
         model = table[f"by_lengths_{header}"]
         places.append((f"{axis} by the model", Look(look.color, DASHED), model))
     add("position [m]", places)
-    whole = np.column_stack([table[TIME], *curves])
+    whole = np.column_stack([table[SECONDS], *curves])
     rows = [[float(v) if np.isfinite(v) else None for v in row] for row in whole]
-    return Comparison(summary, tuple(charts), rows, float(table[TIME][-1]))
+    return Comparison(summary, tuple(charts), rows, float(table[SECONDS][-1]))

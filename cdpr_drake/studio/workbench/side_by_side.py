@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.recorded_log import quantity
+from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import rules_of
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
@@ -114,8 +114,8 @@ def _leaves(value: Mapping[str, Any], before: str, unit: str = "") -> Iterator[t
     for key, inner in value.items():
         if key in OF_THE_PROGRAM:
             continue
-        mine = quantity(key) or unit
-        stem = key.rpartition("_")[0] if quantity(key) else key
+        mine = unit_of(key) or unit
+        stem = key.rpartition("_")[0] if unit_of(key) else key
         words = f"{before} {stem.replace('_', ' ')}".strip()
         if isinstance(inner, Mapping):
             yield from _leaves(inner, words, mine)

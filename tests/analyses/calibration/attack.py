@@ -18,9 +18,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import Sigmas
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog, read_log
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.setup import Sigmas
+from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.calibration.measurements import simulated_poses
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
@@ -56,7 +56,7 @@ class Scene:
     """
 
     robot: Robot
-    log: CalibrationLog
+    log: Measurements
     poses: list[RigidTransform]
     options: dict
 
@@ -114,7 +114,7 @@ def scene(
         return values + sigma * random.standard_normal(values.shape)
 
     lengths = noisy(numbers[:, :, 0] / (1.0 + strain), noise.lengths)
-    log = CalibrationLog(Path(name), count, lengths=lengths)
+    log = Measurements(Path(name), count, lengths=lengths)
     if tensions is not None:
         log = replace(log, tensions=noisy(tensions, noise.tensions))
     if kind == "tracked":
@@ -128,13 +128,13 @@ def scene(
     return Scene(robot, log, poses, {"start": poses[0], **asked, **options})
 
 
-Attack = tuple[str, Callable[[CalibrationLog], CalibrationLog]]
+Attack = tuple[str, Callable[[Measurements], Measurements]]
 
 
 def _spoilt(field: str, change: Callable[[np.ndarray], None]) -> Callable:
     """What changes a copy of the readings."""
 
-    def spoil(log: CalibrationLog) -> CalibrationLog:
+    def spoil(log: Measurements) -> Measurements:
         values = getattr(log, field).copy()
         change(values)
         return replace(log, **{field: values})
@@ -163,7 +163,7 @@ def _swapped(field: str, k: int = 0, n: int = 1, share: float = 1.0, seed: int =
     return _spoilt(field, change)
 
 
-def _late(field: str, rows: int, cables: object) -> Callable[[CalibrationLog], CalibrationLog]:
+def _late(field: str, rows: int, cables: object) -> Callable[[Measurements], Measurements]:
     def change(values: np.ndarray) -> None:
         values[rows:, cables] = values[:-rows, cables].copy()
 
@@ -183,7 +183,7 @@ def _added(field: str, cable: int, course: Callable[[np.ndarray], np.ndarray]) -
 def _turned_angles(axis: int, share: float, seed: int) -> Callable:
     """Roll, pitch or yaw of a tracker with the other sign, in some rows."""
 
-    def spoil(log: CalibrationLog) -> CalibrationLog:
+    def spoil(log: Measurements) -> Measurements:
         poses = list(log.poses)
         for row in _rows(len(poses), share, seed):
             angles = RollPitchYaw(poses[row].rotation()).vector()
@@ -194,7 +194,7 @@ def _turned_angles(axis: int, share: float, seed: int) -> Callable:
     return spoil
 
 
-def attacks(log: CalibrationLog, seed: int = 1) -> Iterator[Attack]:
+def attacks(log: Measurements, seed: int = 1) -> Iterator[Attack]:
     """Errors that its measurements may have."""
     field = "lengths" if log.lengths is not None else "angles"
     cables = getattr(log, field).shape[1]
@@ -269,7 +269,7 @@ class Outcome:
         return self.status != "converged" or self.off <= WITHIN
 
 
-def outcome(of: Scene, spoil: Callable[[CalibrationLog], CalibrationLog] | None = None) -> Outcome:
+def outcome(of: Scene, spoil: Callable[[Measurements], Measurements] | None = None) -> Outcome:
     """Calibrates from a log, spoilt or clean."""
     log, began = of.log if spoil is None else spoil(of.log), time.process_time()
     try:
@@ -291,7 +291,7 @@ HANGPRINTER = Path(__file__).parent / "hangprinter4" / "samples.csv"
 
 def recorded(robot: Robot, path: Path, **options: object) -> Scene:
     """A recorded log; its own calibration is the truth."""
-    log = read_log(path, [cable.name for cable in robot.cables])
+    log = read_measurements(path, [cable.name for cable in robot.cables])
     found = cdpr.calibrate(robot, log, **options)
     return Scene(robot, log, found.result.stations.poses(), dict(options))
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -34,12 +34,14 @@ def recorded(true, *, count=COUNT, noise=1.0):
     start = Point(true, Stations.at(at[:1])).numbers[0, :, 0]
     readings = simulated_lengths(true, at, start, noise * SIGMAS.lengths, random)
     seen = simulated_poses(at, noise * SIGMAS.turn, noise * SIGMAS.place, random, true)
-    return CalibrationLog(Path("simulated"), count, lengths=readings, poses=list(seen))
+    return Measurements(Path("simulated"), count, lengths=readings, poses=list(seen))
 
 
-def asked(unknown, priors=None, **more):
+def task(unknown, log, priors=None, **more):
     """A task whose first pose is believed some centimetres off."""
     start = poses()[0]
     place = start.translation() + np.array([0.02, -0.01, 0.01])
     off = RigidTransform(start.rotation(), place)
-    return CalibrationTask(ROBOT, unknown, priors or {}, sigmas=SIGMAS, start=off, **more)
+    return CalibrationTask(
+        robot=ROBOT, log=log, unknown=unknown, priors=priors or {}, sigmas=SIGMAS, start=off, **more
+    )

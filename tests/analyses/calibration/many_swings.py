@@ -17,7 +17,7 @@ from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
 from cdpr_drake.analyses.calibration.free_motion import FreeMotionTask, FreeSigmas, fit_free_motion
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.materials import BehaviourSettings
@@ -102,7 +102,7 @@ def noisy(poses, tensions, random):
     rows = [
         RigidTransform(RotationMatrix(R), p) for R, p in zip(turns.as_matrix(), places, strict=True)
     ]
-    return CalibrationLog(
+    return Measurements(
         "swing", COUNT, time=np.arange(COUNT) / RATE, poses=rows,
         tensions=tensions + NOISE.tension * random.standard_normal(tensions.shape),
     )  # fmt: skip

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
-from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits.calibration import fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
@@ -56,7 +56,7 @@ def recorded():
     angles = numbers[:, :, 2] + SIGMAS.swivels * random.standard_normal(shape)
     counted, bad = spoiled(lengths - lengths[0], SIGMAS.lengths, random)
     turned, more = spoiled(angles - angles[0], SIGMAS.swivels, random)
-    log = CalibrationLog(Path("spoiled"), COUNT, lengths=counted, swivels=turned)
+    log = Measurements(Path("spoiled"), COUNT, lengths=counted, swivels=turned)
     return poses, log, bad + more
 
 
@@ -71,8 +71,11 @@ def first_pose(number):
 
 def calibrated(start, log=None):
     """The calibration from a first pose, of this log or another."""
-    task = CalibrationTask(ROBOT, ("length_offsets",), sigmas=SIGMAS, start=start, rest=False)
-    return calibrate(task, recorded()[1] if log is None else log)
+    task = CalibrationTask(
+        robot=ROBOT, log=recorded()[1] if log is None else log, unknown=("length_offsets",),
+        sigmas=SIGMAS, start=start, rest=False,
+    )  # fmt: skip
+    return fit_robot(task)
 
 
 def wrong_rows(found):

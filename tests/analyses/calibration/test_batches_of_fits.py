@@ -53,7 +53,7 @@ def test_the_folder_of_a_calibration(tmp_path):
     planar = cdpr.load_robot("planar")
     path = tracked_poses(planar, tmp_path / "log.csv")
     asked = ("C1.exit_point.x", "C1.exit_point.y")
-    cdpr.calibrate(planar, path, asked, folder=tmp_path / "out")
+    cdpr.calibrate(planar, path, unknown=asked, folder=tmp_path / "out")
     assert beside_its_covariance(tmp_path / "out") == asked
 
 

@@ -7,7 +7,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import free_motion_report, identification_report
+from cdpr_drake.analyses.fits import swings
+from cdpr_drake.analyses.fits.fit import Unknown
+from cdpr_drake.analyses.fits.identification import parameter_figure
 from cdpr_drake.models.robot_loader import load_robot
 from tests.figure_faults import figure_faults
 
@@ -35,9 +37,9 @@ def found(count):
 
 def test_no_legend_lies_on_curves_and_titles_are_whole():
     for figure in (
-        free_motion_report._figure(found(1), "held_out"),
-        free_motion_report._unexplained_figure(found(1)),
-        free_motion_report._unexplained_figure(found(2)),
+        swings._turns_figure(found(1), found(1).held_out, "held out"),
+        swings._unexplained_figure(found(1)),
+        swings._unexplained_figure(found(2)),
     ):
         assert figure_faults(figure) == []
         assert all(axes.get_legend() is None for axes in figure.axes)
@@ -51,24 +53,23 @@ UNITS = ["kg", *(unit for unit in GROUPS.values() for _ in range(8))]
 
 
 @pytest.mark.parametrize("compared", [True, False])
-def test_all_rows_say_what_they_are(compared, monkeypatch):
+def test_all_rows_say_what_they_are(compared):
     """Also those of which no truth is known; labels are whole, and no legend is in the way."""
-    found = 1.162345e-4 * np.ones(len(NAMES))
-    result = SimpleNamespace(
-        names=NAMES, units=UNITS, values=found, std=0.011 * found, before=0.9 * found
-    )
-    known = {name: 1.16e-4 for name in NAMES if "offset" not in name}
-    monkeypatch.setattr(identification_report, "true_values", lambda *_: known)
-    drawings = identification_report.identification_drawings(
-        SimpleNamespace(result=result), object() if compared else None
-    )
-    figure = drawings["parameters"]()
+    value = 1.162345e-4
+    unknowns = [
+        Unknown(name, unit, 0.011 * value, value, before=0.9 * value,
+                true=None if "offset" in name or not compared else 1.16e-4)
+        for name, unit in zip(NAMES, UNITS, strict=True)
+    ]  # fmt: skip
+    figure = parameter_figure(unknowns, compared)
     shown = matplotlib.image.imread(BytesIO(figure._repr_png_()))
     assert np.all(shown[:, :2] == 1.0), "labels are cut on the left in a notebook"
     assert figure_faults(figure) == []
     (axes,) = figure.axes
     assert axes.get_legend() is None
     told = [text.xy[1] for text in axes.texts if text.get_text() == "no true value"]
-    rows = [place for place, name in zip(axes.get_yticks(), NAMES, strict=True) if name in known]
+    rows = [
+        place for place, name in zip(axes.get_yticks(), NAMES, strict=True) if "offset" not in name
+    ]
     assert len(told) == (8 if compared else 0)
     assert not set(told) & set(rows)

@@ -10,10 +10,9 @@ from scipy.spatial.transform import Rotation
 from cdpr_drake.analyses.calibration.free_motion import SMALL, steps_within
 from cdpr_drake.analyses.calibration.free_motion_balance import PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeMotionModel
-from cdpr_drake.analyses.calibration.free_motion_report import dominant_frequency
 from cdpr_drake.analyses.calibration.free_motion_sensor import earlier
 from cdpr_drake.analyses.calibration.free_motion_start import StartCoordinates
-from cdpr_drake.analyses.front.free_motion import identify_free_motion
+from cdpr_drake.analyses.fits.swings import dominant_frequency, identify_swings
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.models.robot_loader import load_robot
@@ -48,12 +47,12 @@ def found(tmp_path_factory):
     spans = swings.write(folder / "log.csv", (0, 1, 2))
     believed = swings.believed_file(folder)
     fitted = spans_words((first, first + 0.8) for first, _ in spans[:2])
-    args = ["identify", believed, str(folder / "log.csv"), "--free", fitted]
+    args = ["identify-swings", believed, str(folder / "log.csv"), "--stretches", fitted]
     args += ["--hold-out", spans_words(spans[2:]), "--out", str(folder / "out"), "--lead", "0.8"]
     args += ["--sigma", f"turn={swings.NOISE['turn']},tension={swings.NOISE['tension']}", "--json"]
     with pytest.raises(SystemExit) as ended:
         main(args)
-    return ended.value.code, json.loads((folder / "out/identification.json").read_text()), folder
+    return ended.value.code, json.loads((folder / "out/results.json").read_text()), folder
 
 
 def test_a_swing_by_the_plant_tells_the_platform_and_its_cables(found):
@@ -188,16 +187,16 @@ def test_dominant_frequency_is_that_of_a_sine():
 
 
 REFUSED = [
-    (["--free", "5"], "--free: found '5'; accepted: first:last, the first below the last"),
-    (["--free", "2:1"], "--free: found '2:1'; accepted: first:last"),
-    (["--free", "0:90"], "stretch: found 0:90; accepted: 0.5 s or more within 0 to 2.39 s"),
     (
-        ["--free", "halves", "--unknown", "friction"],
-        "unknown: found 'friction'; accepted of a free",
+        ["--stretches", "5"],
+        "--stretches: found '5'; accepted: first:last, the first below the last",
     ),
-    (["--free", "halves", "--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
-    (["--free", "halves", "--prior", "turn=1"], "--prior: found 'turn'; accepted: of what is"),
-    (["--free", "halves", "--sigma", "turns=1"], "--sigma: found 'turns'; did you mean turn?"),
+    (["--stretches", "2:1"], "--stretches: found '2:1'; accepted: first:last"),
+    (["--stretches", "0:90"], "stretch: found 0:90; accepted: 0.5 s or more within 0 to 2.39 s"),
+    (["--unknown", "friction"], "unknown: found 'friction'; accepted of a free"),
+    (["--lead", "-1"], "--lead: found -1; accepted: > 0 [s]"),
+    (["--prior", "turn=1"], "--prior: found 'turn'; accepted: of what is"),
+    (["--sigma", "turns=1"], "--sigma: found 'turns'; did you mean turn?"),
 ]
 
 
@@ -206,7 +205,7 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
     swings.write(tmp_path / "log.csv", (0,))
     out = tmp_path / "out"
     with pytest.raises(SystemExit) as ended:
-        main(["identify", "irma4u", str(tmp_path / "log.csv"), *options, "--out", str(out)])
+        main(["identify-swings", "irma4u", str(tmp_path / "log.csv"), *options, "--out", str(out)])
     said = printed(capsys).err
     assert ended.value.code == 2
     assert words in said
@@ -218,8 +217,8 @@ def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
     lengths = np.linspace(1.9, 1.95, 240)[:, None]
     swings.write(path, (0,), lengths)
     with pytest.raises(IdentificationError, match=r"C1: found its length changing by 0\.0"):
-        identify_free_motion("irma4u", path, stretches=[(0.0, 2.0)])
+        identify_swings("irma4u", path, stretches=[(0.0, 2.0)])
     lines = [",".join(row.split(",")[:4]) for row in path.read_text().splitlines()]
     path.write_text("\n".join(lines) + "\n")
     with pytest.raises(IdentificationError, match="without which a free motion does not tell the"):
-        identify_free_motion("irma4u", path, "mass", stretches=[(0.0, 2.0)])
+        identify_swings("irma4u", path, unknown="mass", stretches=[(0.0, 2.0)])

@@ -12,9 +12,9 @@ from cdpr_drake.analyses.calibration.free_motion_model import (
     FreeMotionModel,
     usually_bent,
 )
-from cdpr_drake.analyses.calibration.free_motion_report import freely_moved_robot
 from cdpr_drake.analyses.calibration.free_motion_samples import cut, recorded_turns
 from cdpr_drake.analyses.calibration.free_motion_sensor import sensed_tensions, unsensed_tensions
+from cdpr_drake.analyses.fits.swings import swung_robot
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -81,7 +81,7 @@ def test_what_the_plant_swung_with_is_found(group):
     for name, value in TRUE[group].items():
         assert std[name] < 0.5 * abs(value), f"{name} is not told"
     assert ("rests beside its pose" in " ".join(found.remarks)) == (group == "hysteresis")
-    moved = freely_moved_robot(found)
+    moved = swung_robot(found)
     rubs = moved.platform.hysteresis
     assert (rubs is not None) == (group == "hysteresis")
     if rubs is not None:  # the file holds what was found, and a fit begins there
@@ -106,7 +106,7 @@ def test_scale_and_zeros_of_load_cells_are_found():
         assert abs(at - value) < SIGMAS * std, (name, at, std)
         assert std < 0.5 * abs(value)  # it is told
     assert "rests beside its pose" not in " ".join(found.remarks)
-    assert freely_moved_robot(found).platform.hysteresis is None
+    assert swung_robot(found).platform.hysteresis is None
 
 
 def test_nothing_of_it_is_unknown_unless_it_is_named():

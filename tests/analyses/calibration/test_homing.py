@@ -9,17 +9,17 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_request import (
+from cdpr_drake.analyses.fits.calibration import fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.setup import (
     HOMING,
     CalibrationTask,
     Sigmas,
     default_unknown,
 )
-from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.fit_starts import upright_minima
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.turned_sensors import flipped, upside_down
+from cdpr_drake.analyses.fits.starts import upright_minima, upside_down
+from cdpr_drake.analyses.fits.verdict import impossible_poses
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -82,7 +82,7 @@ def homing(resting):
     random = np.random.default_rng(1)
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
     tilts[:, 2] -= YAW
-    log = CalibrationLog(
+    log = Measurements(
         Path("homing"), len(poses), lengths=counted(lengths, NOISE * HOMING.lengths, random),
         swivels=counted(swivels, NOISE * HOMING.swivels, random),
         tensions=tensions + NOISE * 0.5 * random.standard_normal(tensions.shape),
@@ -96,7 +96,7 @@ def test_nothing_has_to_be_said(homing):
     assert default_unknown(robot, log) == ("length_offsets", "swivel_offsets", "tilt_zero.yaw")
     found = cdpr.calibrate(robot, log)
     assert found.result.status == "converged"
-    assert found.task.sigmas == HOMING
+    assert found.source.setup.task.sigmas == HOMING
     distance, angle = pose_error(poses[0], found.result.stations.poses()[0])
     assert distance < 5.0 * NOISE * found.result.pose_std[0, 1]
     assert angle < 5.0 * NOISE * found.result.pose_std[0, 0]
@@ -107,13 +107,15 @@ def test_nothing_has_to_be_said(homing):
 def test_three_cables_without_tension_sensors_find_where_they_began(resting):
     """By winches and swivel angles alone."""
     (poses, _, lengths, swivels), random = resting, np.random.default_rng(2)
-    log = CalibrationLog(
+    log = Measurements(
         Path("homing"), len(poses), lengths=counted(lengths, SIGMAS.lengths, random),
         swivels=counted(swivels, SIGMAS.swivels, random),
     )  # fmt: skip
     start = RigidTransform([0.1, -0.1, 0.3])
-    task = CalibrationTask(three_cables(), ("length_offsets",), sigmas=SIGMAS, start=start)
-    result = calibrate(task, log).result
+    task = CalibrationTask(
+        robot=three_cables(), log=log, unknown=("length_offsets",), sigmas=SIGMAS, start=start
+    )
+    result = fit_robot(task).result
     assert result.status == "converged"
     assert result.spread() < 2.0
     far = pose_error(start, poses[0])[0]
@@ -127,7 +129,7 @@ def test_three_cables_without_tension_sensors_find_where_they_began(resting):
 def test_swivels_whose_sign_is_turned_are_named(homing):
     robot, log, _ = homing
     turned = replace(log, swivels=-log.swivels)
-    found = cdpr.calibrate(robot, turned, sigmas={"swivels": 3e-3}, outliers=False)
+    found = cdpr.calibrate(robot, turned, sigmas={"swivels": 3e-3}, keep_outliers=True)
     assert found.result.status == "misfit"
     assert "swivel angles fit with the sign turned" in found.misfit[0]
     assert int(found.misfit[0].split()[0]) > 0.9 * log.swivels.size
@@ -146,19 +148,19 @@ def test_poses_upside_down_are_told_from_upright_ones():
 
 def test_a_pose_without_a_reading_to_spare_is_no_reason_to_blame_a_sensor():
     turns = (0.0, 0.0, 0.0), (np.pi, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.1, 0.0)
-    up = np.array([0.0, 0.0, 1.0])
+    robot, up = three_cables(), np.array([0.0, 0.0, 1.0])
     spare = SimpleNamespace(stations=stations(*turns), surplus=np.array([9, 0, 2, 0]))
-    misfit, remarks = flipped(spare, up)
+    misfit, remarks = impossible_poses(robot, spare, up)
     assert [words.split(" in ")[1] for words in misfit] == [
         "1 of 4 rows: sign or zero of a sensor?"
     ]
     assert [words.split(":")[0] for words in remarks] == ["row 2"]
     upright = SimpleNamespace(stations=stations(turns[0]), surplus=np.array([0]))
-    assert flipped(upright, up) == ((), ())
+    assert impossible_poses(robot, upright, up) == ([], [])
     most = SimpleNamespace(stations=stations(*turns[1:]), surplus=np.zeros(3, int))
-    misfit, remarks = flipped(most, up)
+    misfit, remarks = impossible_poses(robot, most, up)
     assert "in 2 of 3 rows" in misfit[0]
-    assert remarks == ()
+    assert remarks == []
 
 
 def test_an_upright_minimum_goes_before_one_upside_down_that_costs_less():

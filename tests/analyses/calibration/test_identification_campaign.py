@@ -4,10 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration import identification_campaign as campaign
-from cdpr_drake.analyses.calibration.identification_task import IdentificationTask, identify
-from cdpr_drake.analyses.calibration.log_file import read_log
-from cdpr_drake.analyses.front.simulated_fits import identify_in_simulation
+from cdpr_drake.analyses.fits import identify_campaign as campaign
+from cdpr_drake.analyses.fits.dynamics import IdentificationTask, fit_dynamics
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
@@ -25,7 +24,7 @@ def folder(tmp_path_factory):
         first = replace(scenario.trajectory.stretches[0], duration=1.5)
         scenario.trajectory.stretches = [first]
         folder = tmp_path_factory.mktemp("campaigns") / "one"
-        run = identify_in_simulation(scenario, folder=folder)
+        run = campaign.identify_campaign(scenario, folder=folder)
     finally:
         campaign.POSES = kept
     return folder, run
@@ -36,26 +35,23 @@ def test_it_is_written_and_shows_itself(folder):
     assert run.folder == place
     assert run.fits
     assert not run.failed
-    assert json.loads(json.dumps(run.as_dict())) == json.loads(
-        (place / "identification.json").read_text()
-    )
+    assert json.loads(json.dumps(run.as_dict())) == json.loads((place / "results.json").read_text())
     assert {path.stem for path in place.glob("*.png")} == {"validation", "parameters", "tracking"}
-    assert "tracking, identified" in repr(run)
-    assert len(repr(run).splitlines()) <= 10
-    assert run.robot().platform.mass == run.found.platform.mass
-    with pytest.raises(CdprError, match="'trackin' is unknown; did you mean tracking"):
+    assert "Tracking of acrobot_computed_torque" in repr(run)
+    assert load_robot(str(place / "robot.yaml")).platform.mass == run.model.platform.mass
+    with pytest.raises(CdprError, match="found 'trackin'; did you mean tracking"):
         run.plot("trackin")
 
 
 def test_tracking_is_that_of_the_true_robot_with_what_was_found(folder):
-    tracking = folder[1].tracking
+    tracking = folder[1].source.tracking
     before, found, true = (tracking[w]["mean_m"] for w in ("believed before", "identified", "true"))
     assert found < 0.02 * before
     assert found < 1.2 * true
 
 
 def test_parameters_are_found_and_another_motion_is_explained(folder):
-    said = json.loads((folder[0] / "identification.json").read_text())
+    said = json.loads((folder[0] / "results.json").read_text())
     for one in said["parameters"]:
         what = one["name"].partition(".")[0]
         if what in ("mass", "center_of_mass", "inertia") or one["name"].endswith("stiffness"):
@@ -71,13 +67,13 @@ def test_parameters_are_found_and_another_motion_is_explained(folder):
 def test_the_logs_that_it_leaves_say_the_same(folder):
     place, run = folder
     believed = load_robot(str(place / "believed_robot.yaml"))
-    log = read_log(place / "excitation.csv", [cable.name for cable in believed.cables])
+    log = read_measurements(place / "excitation.csv", [cable.name for cable in believed.cables])
     task = IdentificationTask(
-        robot=believed, unknown=run.identification.task.unknown, bandwidth=campaign.BANDWIDTH,
-        pulleys=False, sigma_lengths=campaign.SIGMA_LENGTHS,
+        robot=believed, unknown=run.source.identification.task.unknown, pulleys=False,
+        sigma_lengths=campaign.SIGMA_LENGTHS,
     )  # fmt: skip
-    again = identify(task, log)
-    first = run.identification.result
+    again = fit_dynamics(task, log, bandwidth=campaign.BANDWIDTH)
+    first = run.result
     assert np.max(np.abs(again.result.values - first.values) / first.std) < 1e-6
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
-from cdpr_drake.analyses.calibration.rest_log import at_rest
+from cdpr_drake.analyses.fits.rest_log import at_rest
+from cdpr_drake.analyses.fits.setup import CalibrationTask
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.models.robot_loader import load_robot
 
 STANDS, STOPS, NOISE = 30, 5, 1e-4
@@ -25,7 +25,7 @@ def log():
         part for a, b in pairwise(corners) for part in (np.tile(a, (STANDS, 1)), a + way * (b - a))
     ])  # fmt: skip
     swivels = np.pi + rows + NOISE * random.standard_normal(rows.shape)
-    return CalibrationLog(
+    return Measurements(
         Path("drive.csv"), len(rows), time=0.1 * np.arange(len(rows)),
         lengths=1.0 + rows + NOISE * random.standard_normal(rows.shape),
         swivels=np.arctan2(np.sin(swivels), np.cos(swivels)),
@@ -33,14 +33,15 @@ def log():
     ), corners[:-1]  # fmt: skip
 
 
-def task(rest=None):
-    return CalibrationTask(load_robot("irma4u"), ("length_offsets",), rest=rest)
+def task(log, rest=None):
+    return CalibrationTask(load_robot("irma4u"), log, ("length_offsets",), rest=rest)
 
 
 def test_each_stop_is_a_row_with_its_means(log):
     log, corners = log
-    asked, means = at_rest(task(), log)
-    assert asked.rest is None
+    stops = at_rest(task(log))
+    means = stops.log
+    assert stops.rest is None
     assert means.count == STOPS
     np.testing.assert_allclose(means.lengths, 1.0 + corners, atol=3.0 * NOISE)
     off = np.exp(1j * means.swivels) / np.exp(1j * (np.pi + corners))
@@ -52,14 +53,14 @@ def test_each_stop_is_a_row_with_its_means(log):
 
 
 def test_a_log_that_balance_does_not_need_stays_as_it_is(log):
-    for asked, other in [(task(rest=False), log[0]), (task(), replace(log[0], time=None))]:
-        assert at_rest(asked, other) == (asked, other)
+    for asked in (task(log[0], rest=False), task(replace(log[0], time=None))):
+        assert at_rest(asked) is asked
 
 
-def test_without_a_stop_balance_is_left_out_unless_it_is_asked_for(log):
+def test_without_a_stop_balance_is_left_out_unless_it_is_asked_for():
     time = 0.1 * np.arange(200)
     rows = 0.2 * np.sin(0.8 * time[:, None] + np.arange(4))
-    drive = CalibrationLog(
+    drive = Measurements(
         Path("drive.csv"), 200, time=time, lengths=1.0 + rows, tensions=40.0 + rows
     )
     asked, same = at_rest(task(), drive)

@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from cdpr_drake.analyses.calibration import calibration_task
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask, Sigmas
-from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits import calibration
+from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -55,30 +54,31 @@ def planar_log(bad, sigma=2e-4, outliers=True):
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     readings = lengths + 2e-4 * random.standard_normal(lengths.shape)
     readings[8, 1] += bad
-    log = CalibrationLog(Path("plane"), 14, lengths=readings - readings[0])
+    log = Measurements(Path("plane"), 14, lengths=readings - readings[0])
     task = CalibrationTask(
-        robot, ("length_offsets",), sigmas=Sigmas(lengths=sigma), start=poses[0], outliers=outliers
-    )
-    return poses, calibrate(task, log)
+        robot=robot, log=log, unknown=("length_offsets",), sigmas=Sigmas(lengths=sigma),
+        start=poses[0], outliers=outliers,
+    )  # fmt: skip
+    return poses, fit_robot(task)
 
 
 def test_a_row_that_fits_as_well_elsewhere_is_told():
     # Of four lengths one is bad: that three agree at the true pose tells no more than three others.
-    poses, calibration = planar_log(0.02)
-    others = [tie for tie in calibration.ties if tie.pose == 8]
+    poses, found = planar_log(0.02)
+    others = [tie for tie in found.ties if tie.pose == 8]
     assert max(tie.more for tie in others) < 9.0
-    places = [calibration.result.stations.poses()[8], *(tie.X_WP for tie in others)]
+    places = [found.result.stations.poses()[8], *(tie.X_WP for tie in others)]
     assert len(places) > 1
     assert min(pose_error(poses[8], X)[0] for X in places) < 2e-3
-    said = calibration_dict(calibration)
+    said = calibration_fit(found).as_dict()
     assert 9 in [row["row"] for row in said["ties"]]
     assert any("another pose that fits as well" in words for words in said["remarks"])
 
 
 def test_without_bad_readings_a_plane_is_found():
-    poses, calibration = planar_log(0.0)
-    assert calibration.result.outliers == calibration.misfit == ()
-    for X, Y in zip(poses, calibration.result.stations.poses(), strict=True):
+    poses, found = planar_log(0.0)
+    assert found.result.outliers == found.misfit == ()
+    for X, Y in zip(poses, found.result.stations.poses(), strict=True):
         assert pose_error(X, Y)[0] < 2e-3
 
 
@@ -99,7 +99,7 @@ def test_swivels_of_the_other_sign_are_a_misfit(turned_round):
     assert any(words in said for said in turned_round.misfit)
     worst = turned_round.result.largest[0]
     assert f"row {worst.pose + 1}, {worst.what}" in turned_round.misfit[-1]
-    said = calibration_dict(turned_round)
+    said = calibration_fit(turned_round).as_dict()
     assert said["status"] == "misfit"
     assert said["misfit_factor"] == 3.0
     first = said["largest_residuals"][0]
@@ -108,7 +108,7 @@ def test_swivels_of_the_other_sign_are_a_misfit(turned_round):
 
 
 def test_residuals_beyond_three_sigmas_are_a_misfit_without_outliers_too(monkeypatch):
-    monkeypatch.setattr(calibration_task, "turned_sensors", lambda *_: ())  # nor is one to blame
+    monkeypatch.setattr(calibration, "turned_sensors", lambda *_: ())  # nor is one to blame
     _, found = planar_log(0.0, sigma=2e-5, outliers=False)
     assert found.result.spread() > 3.0
     assert found.result.status == "misfit"
@@ -123,12 +123,14 @@ def test_an_inclinometer_holds_what_lengths_leave_open():
     poses = logs.poses(6)
     lengths = Point(calibration_model(robot), Stations.at(poses)).numbers[:, :, 0]
     tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    log = CalibrationLog(
+    log = Measurements(
         Path("tilted"), 6, lengths=lengths, tilts=tilts, torques=np.zeros((6, 4)),
         headers={"rpy": ("roll_rad",), "motor torques": ("C1_torque_nm", "C2_torque_nm")},
     )  # fmt: skip
-    task = CalibrationTask(robot, (), sigmas=Sigmas(tilt=1e-3, yaw=1e-3), start=poses[0])
-    found = calibrate(task, log)
+    task = CalibrationTask(
+        robot=robot, log=log, unknown=(), sigmas=Sigmas(tilt=1e-3, yaw=1e-3), start=poses[0]
+    )
+    found = fit_robot(task)
     assert found.result.residuals["inclination"].count == 18
     for X, Y in zip(poses, found.result.stations.poses(), strict=True):
         assert pose_error(X, Y)[0] < 1e-4

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.log_file import CalibrationLog
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -134,7 +134,7 @@ def test_a_frame_believed_far_too_small_ends_in_the_right_anchors():
     model = calibration_model(machine)
     lengths = Point(model, Stations.at(poses)).numbers[:, :, 0]
     lengths = lengths + 1e-3 * random.standard_normal(lengths.shape)
-    log = CalibrationLog(Path("wide"), len(poses), lengths=lengths)
+    log = Measurements(Path("wide"), len(poses), lengths=lengths)
     found = cdpr.calibrate(framed(BELIEVED_CORNERS), log)
     assert found.result.status == "converged"
     np.testing.assert_allclose(

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration.calibrated_robots import calibration_model
-from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
-from cdpr_drake.analyses.calibration.calibration_request import TagPlace
-from cdpr_drake.analyses.calibration.calibration_task import calibrate
-from cdpr_drake.analyses.calibration.tag_file import read_tags
+from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.tags import TagPlace, read_tags
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measurements import simulated_corners
 from cdpr_drake.calibration.parameters import model_difference, parameter_layout
@@ -17,7 +15,7 @@ from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.analyses.calibration.logs import ROBOT, asked, poses, recorded
+from tests.analyses.calibration.logs import ROBOT, poses, recorded, task
 
 FAR = pose_from_angles(np.array([1.5, -0.7, 0.4]), np.radians([20.0, -35.0, 110.0]))
 """The tracker's frame in W: a camera at the wall."""
@@ -33,7 +31,7 @@ def test_a_tracker_on_the_wall_is_found(unknown, marker):
     true = replace(calibration_model(ROBOT), X_WK=FAR)
     if marker:
         true = replace(true, X_PM=MARKER)
-    found = calibrate(asked(unknown), recorded(true)).result
+    found = fit_robot(task(unknown, recorded(true))).result
     assert found.status == "converged"
     assert found.gauge == found.prior_only == found.outliers == ()
     assert len(found.names) == 6 * len(unknown)
@@ -49,11 +47,10 @@ def errors(found, true, *groups):
 
 def test_exit_points_and_the_trackers_frame_cannot_both_be_told():
     true = replace(calibration_model(ROBOT), X_WK=FAR)
-    task = asked(("exit_points", "tracker"), {"exit_points": 0.01})
-    calibration = calibrate(task, recorded(true))
+    calibration = fit_robot(task(("exit_points", "tracker"), recorded(true), {"exit_points": 0.01}))
     words = "translation of the world frame along "
     assert calibration.result.gauge[-3:] == (words + "x", words + "y", words + "z")
-    said = calibration_dict(calibration)
+    said = calibration_fit(calibration).as_dict()
     assert "the tracker belong to the log" in said["remarks"][-1]
     assert len(said["tracker_X_WK"]) == 7
 
@@ -64,7 +61,8 @@ def test_drum_and_pulley_radii_come_back_by_a_tracker_of_unknown_frame():
     radius = exact.cables.pulley_radius + 5e-4
     cables = replace(exact.cables, pulley_radius=radius)
     true = replace(exact, X_WK=FAR, length_scale=scale, cables=cables)
-    found = calibrate(asked(("length_scales", "pulley_radii", "tracker")), recorded(true)).result
+    unknown = ("length_scales", "pulley_radii", "tracker")
+    found = fit_robot(task(unknown, recorded(true))).result
     assert found.gauge == ()
     off = errors(found, true, "length_scale", "pulley_radius", "tracker")
     assert np.max(off) < MOST_SIGMAS
@@ -93,17 +91,21 @@ def test_tags_that_were_measured_so_well_pull_as_much(tmp_path):
     pinhole = load_camera("ids_kowa").pinhole(640, 480)
     uv = simulated_corners(true, poses(), targets, pinhole, 0.2, np.random.default_rng(2))
     log = replace(log, corners={tag: uv[:, k] for k, tag in enumerate(targets)})
-    found = calibrate(asked(("camera",), tags=tags, image_size=(640, 480)), log).result
+
+    def fitted(tags):
+        return fit_robot(task(("camera",), log, tags=tags, image_size=(640, 480))).result
+
+    found = fitted(tags)
     assert {name.split(".")[0] for name in found.names} == {"camera", "tag3", "tag5"}
     # Seen from poses that cables tell to 0.1 mm, its own 2 mm hardly matter; they do say more.
     alone = tags | {3: TagPlace(0.06)}
-    sure = calibrate(asked(("camera",), tags=alone, image_size=(640, 480)), log).result
+    sure = fitted(alone)
     mine = [name.startswith("tag3") for name in found.names]
     assert np.all(found.std[mine] <= sure.std[mine] * (1.0 + 1e-9))
     assert np.any(found.std[mine] < sure.std[mine])
     # Known to a micrometre, it is where it was measured.
     exact = tags | {3: tags[3]._replace(sigma_place=1e-6, sigma_turn=1e-6)}
-    held = calibrate(asked(("camera",), tags=exact, image_size=(640, 480)), log).result
+    held = fitted(exact)
     assert pose_error(held.model.tags[3], places[3])[0] < 5e-6
 
 

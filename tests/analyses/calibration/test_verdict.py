@@ -1,21 +1,20 @@
 """From where on a result is no fit, a sensor is bad, and outliers are many."""
 
 from dataclasses import fields
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.calibration.calibration_report import calibration_drawings
-from cdpr_drake.analyses.calibration.fit_verdict import (
+from cdpr_drake.analyses.fits.figures import fit_figure
+from cdpr_drake.analyses.fits.fit import Fit as Fitted
+from cdpr_drake.analyses.fits.verdict import (
     bad_sensors,
-    doubts,
+    many_outliers,
     misfits,
     with_enlarged_deviations,
 )
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
-from cdpr_drake.models.robot_loader import load_robot
 from tests.figure_faults import figure_faults
 
 
@@ -74,7 +73,7 @@ def test_a_sensor_that_is_off_half_of_the_time_is_named(readings, dropped, bad):
 )
 def test_outliers_beyond_a_tenth_are_many(outliers, degrees, many):
     of = result(outliers=tuple(outlier(k) for k in range(outliers)), degrees=degrees)
-    alone, several = doubts(of, 1), doubts(of, 2)
+    alone, several = many_outliers(of, 1), many_outliers(of, 2)
     assert len(alone) == len(several) == many
     if many:
         assert alone[0].startswith(f"{outliers} outliers beside {degrees} degrees of freedom")
@@ -123,14 +122,13 @@ def test_a_row_that_contradicts_itself_is_as_unsure_as_what_was_thrown_out():
 
 @pytest.mark.parametrize("spread", [1.0, 4.0])
 def test_the_figure_says_why_it_is_no_fit(spread):
-    kinds = {"lengths": Fit(40, spread, 9.0), "tag corners": Fit(20, spread, 9.0, 2)}
-    of = result(
-        chi_square=spread**2 * 40, degrees=40, residuals=kinds, names=("C1.exit_point.x",),
-        units=("m",), values=np.array([0.01]), std=np.array([0.001]),
+    of = result(chi_square=spread**2 * 40, degrees=40)
+    kind = {"count": 40, "rms_sigmas": spread, "largest_sigmas": 9.0, "dropped": 0}
+    fitted = Fitted(
+        title="Calibration of planar", model=None, status="", unknowns=(), spread=spread,
+        misfit=misfits(of), residuals={"lengths": kind, "tag corners": kind | {"dropped": 2}},
     )  # fmt: skip
-    task = SimpleNamespace(robot=load_robot("planar"))
-    calibration = SimpleNamespace(result=of, misfit=misfits(of), task=task, held=None)
-    figure = calibration_drawings(calibration)["calibration"]()
+    figure = fit_figure(fitted, [("exit_points", "m", np.array([0.01]), np.array([0.001]))])
     assert figure_faults(figure) == []
     title = " ".join(figure.get_suptitle().split())
     fits = spread < 3.0

@@ -13,7 +13,6 @@ import pytest
 
 from cdpr_drake.analyses.frame.folder import (
     LOCK,
-    MARKER,
     PART,
     Folder,
     differences,
@@ -24,6 +23,7 @@ from cdpr_drake.analyses.frame.folder import (
     results_folder,
 )
 from cdpr_drake.analyses.reporting.deferred_figures import NothingToDraw
+from cdpr_drake.analyses.reporting.written_files import MARKER
 from cdpr_drake.errors import OutputFolderError
 
 WANTED = {"robot": "planar", "steps": [1, 2], "seed": 1}

@@ -6,13 +6,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.calibration.calibration_report import calibration_dict
-from cdpr_drake.analyses.calibration.calibration_request import CalibrationTask
-from cdpr_drake.analyses.calibration.calibration_task import calibrate as calibrate_log
-from cdpr_drake.analyses.calibration.identification_report import identification_dict
-from cdpr_drake.analyses.calibration.identification_task import IdentificationTask
-from cdpr_drake.analyses.calibration.identification_task import identify as identify_log
-from cdpr_drake.analyses.calibration.log_file import read_log
+from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.dynamics import IdentificationTask, fit_dynamics
+from cdpr_drake.analyses.fits.setup import CalibrationTask
+from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from tests.analyses.front.front_checks import as_json, one_line, shows_itself
@@ -43,26 +40,25 @@ def tracked_poses(robot, path):
 
 def test_a_calibration(planar, tmp_path):
     path = tracked_poses(planar, tmp_path / "log.csv")
-    asked = ("C1.exit_point.x", "C1.exit_point.y")
-    found = cdpr.calibrate(planar, path, asked)
-    log = read_log(path, [cable.name for cable in planar.cables])
-    expected = calibrate_log(CalibrationTask(robot=planar, unknown=asked), log)
-    told, wanted = as_json(found), json.loads(json.dumps(calibration_dict(expected)))
+    unknown = {"unknown": ("C1.exit_point.x", "C1.exit_point.y")}
+    found = cdpr.calibrate(planar, path, **unknown)
+    log = read_measurements(path, [cable.name for cable in planar.cables])
+    same = calibration_fit(fit_robot(CalibrationTask(robot=planar, log=log, **unknown)))
+    told, expected = as_json(found), json.loads(json.dumps(same.as_dict()))
     assert told.pop("seconds") > 0.0
-    assert told == {key: value for key, value in wanted.items() if key != "seconds"}
-    moved = found.robot().cables[0].exit_point - planar.cables[0].exit_point
+    assert told == {key: value for key, value in expected.items() if key != "seconds"}
+    moved = found.model.cables[0].exit_point - planar.cables[0].exit_point
     np.testing.assert_allclose(moved, [0.005, 0.0, 0.0], atol=1e-4)
     shows_itself(found)
     assert isinstance(found.plot(), Figure)
     out = tmp_path / "out"
-    kept = cdpr.calibrate(planar, path, asked, folder=out, formats=("svg",))
+    kept = cdpr.calibrate(planar, path, **unknown, folder=out, formats=("svg",))
     assert kept.folder == out
     assert {path.name for path in out.glob("*.svg")} == {"calibration.svg", "correlation.svg"}
     assert json.loads((out / "results.json").read_text()) == as_json(kept)
-    one_line(lambda: cdpr.calibrate(planar, path, asked, folder=out), "add overwrite")
-    one_line(lambda: cdpr.calibrate(planar, path, asked, propose=0), "propose: found 0")
-    one_line(lambda: cdpr.calibrate(planar, path, asked, sigmas={"length": 1.0}), "lengths")
-    one_line(lambda: cdpr.calibrate(planar, path, asked, prior={}), "prior", "priors")
+    one_line(lambda: cdpr.calibrate(planar, path, **unknown, folder=out), "add overwrite")
+    one_line(lambda: cdpr.calibrate(planar, path, propose=0), "propose: found 0")
+    one_line(lambda: cdpr.calibrate(planar, path, sigmas={"length": 1.0}), "lengths")
     one_line(lambda: cdpr.calibrate(planar, tmp_path / "no.csv"), "no.csv")
 
 
@@ -75,13 +71,12 @@ def test_an_identification(tmp_path):
     rows = np.column_stack([time, poses, tensions])
     path = tmp_path / "motion.csv"
     np.savetxt(path, rows, delimiter=",", header=",".join(header), comments="", fmt="%.12g")
-    found = cdpr.identify(robot, path, pulleys=False)
-    log = read_log(path, [cable.name for cable in robot.cables])
-    expected = identify_log(IdentificationTask(robot=robot, pulleys=False), log)
-    np.testing.assert_array_equal(found.result.values, expected.result.values)
-    assert found.as_dict()["parameters"] == identification_dict(expected)["parameters"]
-    assert "mass" in shows_itself(found)
-    one_line(lambda: cdpr.identify(robot, path, bandwith=3.0), "bandwith", "bandwidth")
+    fit = cdpr.identify(robot, path, pulleys=False)
+    log = read_measurements(path, [cable.name for cable in robot.cables])
+    again = fit_dynamics(IdentificationTask(robot=robot, pulleys=False), log)
+    np.testing.assert_array_equal([u.value for u in fit.unknowns], again.result.values)
+    assert fit.model.platform.mass == again.result.model.mass
+    assert "mass" in shows_itself(fit)
 
 
 def test_a_design(planar, tmp_path):

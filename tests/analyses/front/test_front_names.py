@@ -21,7 +21,7 @@ from tests.analyses.front.front_checks import HOMES, RESULTS, as_json, one_line,
 
 PROMISED = """
     __version__ load_robot robot_names load_scenario scenario_names Robot Scenario CableSet Pose
-    import_robot export_robot simulate repeat_run run_many serve finish_run Session
+    import_robot export_robot simulate repeat_run run_many serve finish_run
     solve_tensions distribute
     TensionProblem TensionSolution TENSION_METHODS solve_static find_equilibria
     solve_forward_kinematics solve_inverse_kinematics plot compute_workspace assess_stability

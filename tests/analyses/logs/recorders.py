@@ -113,3 +113,31 @@ def columns(separator=",", decimal=".", ending="\n"):
     lines = [separator.join(header)]
     lines += [separator.join(f"{cell:.3f}".replace(".", decimal) for cell in row) for row in rows]
     return ending.join(lines) + ending
+
+
+def maslow(count=8):
+    """The log of a Maslow's calibration: its list grows, and goes to the log each time."""
+    poses = [[2300.5 + 7 * k, 923.4 + 11 * k, 1733.87 - 5 * k, 2801.87 - 3 * k]
+             for k in range(count)]  # fmt: skip
+    lines = ["[MSG:INFO: Calibration started]"]
+    for rows in (poses[:3], poses):
+        belts = "".join(
+            f"{{bl:{bl:.2f},   br:{br:.2f},   tr:{tr:.2f},   tl:{tl:.2f}}},"
+            for bl, br, tr, tl in rows
+        )
+        lines += ["$/Maslow_tlX=0.0", f"CLBM:[{belts}]"]
+    return "\n".join(lines) + "\n"
+
+
+def ros(count=6):
+    """What rostopic echo -p writes of a tracker, times in ns."""
+    header = "%time,field.header.seq,field.header.stamp,field.header.frame_id"
+    header += ",field.pose.position.x,field.pose.position.y,field.pose.position.z"
+    header += ",field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z"
+    header += ",field.pose.orientation.w"
+    start = 1732800000000000000
+    rows = [
+        f"{start + 10_000_000 * k + 300},{k},{start + 10_000_000 * k},world,{0.1 * k:g},1,2,0,0,0,1"
+        for k in range(count)
+    ]
+    return "\n".join([header, *rows]) + "\n"

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.logs.log_formats import detect_log, read_recorded
+from cdpr_drake.analyses.logs.dialects import read_log, recognise
 from cdpr_drake.analyses.reporting.exported_logs import LOG_WRITERS
 from cdpr_drake.errors import LogFileError, OutputFormatError
 
@@ -58,13 +58,13 @@ def test_its_own_reader_finds_transforms_and_quantities(run_folder):
 def test_it_is_read_back_as_its_text_is(run_folder):
     folder, _ = run_folder
     path = write(folder)
-    assert detect_log(path).format == "mcap"
-    log, text = read_recorded(path), read_recorded(folder / "log.csv")
-    assert log.format == "mcap"
-    assert list(log.columns) == list(text.columns)
-    assert len(log.columns) > 9
-    for header, values in text.columns.items():
-        np.testing.assert_array_equal(log.columns[header], values)
+    assert recognise(path)[0] == "mcap"
+    log, text = read_log(path), read_log(folder / "log.csv")
+    assert log.dialect == "mcap"
+    assert list(log.frame) == list(text.frame)
+    assert len(log.frame.columns) > 9
+    for header, values in text.frame.items():
+        np.testing.assert_array_equal(log.frame[header], values)
 
 
 @pytest.mark.parametrize("row", [0, 3])
@@ -73,9 +73,9 @@ def test_what_is_not_finite_is_left_out_and_comes_back_so(run_folder, row):
     log["tensions"][row, 1] = np.nan
     np.savez(folder / "log.npz", **log)
     path = write(folder)
-    back = read_recorded(path)
-    header = next(name for name in back.columns if "C2" in name)
-    assert np.flatnonzero(np.isnan(back.columns[header])).tolist() == [row]
+    back = read_log(path)
+    header = next(name for name in back.frame if "C2" in name)
+    assert np.flatnonzero(np.isnan(back.frame[header])).tolist() == [row]
 
 
 def made_of(**keys):
@@ -137,7 +137,7 @@ def test_transforms_alone_are_poses(run_folder):
                 writer.add_message(channel, m.log_time, m.data, m.publish_time)
         writer.add_message(image, 0, b"\1\2", 0)
         writer.finish()
-    back = read_recorded(path)
+    back = read_log(path)
     columns = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
     np.testing.assert_allclose(back.table(columns), log["X_WP"], rtol=1e-15)
     np.testing.assert_allclose(back.time, log["time"], atol=1e-12)
@@ -149,11 +149,11 @@ def test_what_cannot_be_is_said_in_one_line(run_folder, monkeypatch):
     path = write(folder)
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(LogFileError, match=r"log.mcap: cannot be read as MCAP") as refused:
-        read_recorded(path)
+        read_log(path)
     assert "\n" not in str(refused.value)
     np.savez(folder / "log.npz", **{**log, "time": log["time"] - 1.0})
     with pytest.raises(OutputFormatError, match="time: found -1; accepted by mcap: >= 0"):
         write(folder)
-    monkeypatch.setattr("cdpr_drake.analyses.logs.mcap_log.find_spec", lambda name: None)
+    monkeypatch.setattr("cdpr_drake.analyses.logs.other_files.find_spec", lambda name: None)
     with pytest.raises(LogFileError, match=r"pip install '\.\[mcap\]'"):
-        read_recorded(path)
+        read_log(path)

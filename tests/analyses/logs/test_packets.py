@@ -1,14 +1,19 @@
 """Readings that came in packets are put back to when they were taken."""
 
 import re
+from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.io import savemat
 
-from cdpr_drake.analyses.front.logs import import_log
-from cdpr_drake.analyses.logs.packets import packet_clock, without_packets
-from cdpr_drake.analyses.logs.recorded_log import ANGLES, TIME, RecordedLog
+from cdpr_drake.analyses.logs.clocks import without_packets
+from cdpr_drake.analyses.logs.columns import PARTS, RPY, SECONDS
+from cdpr_drake.analyses.logs.import_log import import_log
+from cdpr_drake.analyses.logs.log import Log
+
+ANGLES = list(PARTS[RPY])
 
 SPEED, SWING = 13.0, np.radians(25.0)
 """Of a platform that swings twice a second [rad/s], and how far [rad]."""
@@ -18,6 +23,12 @@ STEP, PERIOD, PACKET = 1e-3, 0.01, 3
 
 OFF = SWING * (SPEED * PERIOD) ** 4 / 384 + SWING * SPEED * STEP
 """Cubics between readings, and the row at which a reading comes first, a millisecond late."""
+
+
+def made(columns):
+    """A log of columns."""
+    frame = pd.DataFrame(columns)
+    return Log(path=Path("made"), dialect="", why="", frame=frame, ledger=pd.DataFrame())
 
 
 def turns(time):
@@ -38,13 +49,13 @@ def packed(packet=PACKET, span=4.0):
     held = np.searchsorted(came, time + 1e-9, side="right") - 1
     told = turns(taken)[np.maximum(held, 0)]
     told = np.arctan2(np.sin(told), np.cos(told))
-    columns = {TIME: time, **dict(zip(ANGLES, told.T, strict=True))}
-    return RecordedLog("made", "made", "it was made", columns)
+    columns = {SECONDS: time, **dict(zip(ANGLES, told.T, strict=True))}
+    return made(columns)
 
 
 def off(log, late=0.0):
     """Largest error of angles [rad], late by a constant time."""
-    time = log.columns[TIME]
+    time = log.frame[SECONDS]
     wrong = log.table(ANGLES) - turns(time - late)
     wrong = np.arctan2(np.sin(wrong), np.cos(wrong))
     return np.nanmax(np.abs(wrong[(time > 20.1) & (time < 23.9)]))
@@ -52,9 +63,6 @@ def off(log, late=0.0):
 
 def test_packets_are_spread_over_the_time_in_which_they_were_taken():
     log = packed()
-    clock = packet_clock(log.time, log.table(ANGLES))
-    assert clock.period == pytest.approx(PERIOD, rel=1e-5)
-    assert clock.packet == pytest.approx(PACKET, rel=0.01)
     spread = without_packets(log)
     # Held readings are wrong even with the best constant delay; these are not.
     assert min(off(log, late) for late in np.arange(0.0, 0.03, 0.002)) > 0.05
@@ -67,14 +75,14 @@ def test_packets_are_spread_over_the_time_in_which_they_were_taken():
 def test_readings_that_came_one_by_one_stay():
     log = packed(packet=1)
     assert without_packets(log) is log
-    still = RecordedLog("made", "made", "", {**log.columns, ANGLES[0]: 0.0 * log.time})
+    still = made({**log.frame, ANGLES[0]: 0.0 * log.time})
     assert without_packets(still) is still
-    bare = RecordedLog("made", "made", "", {TIME: log.time, "C1_length_m": 0.0 * log.time})
+    bare = made({SECONDS: log.time, "C1_length_m": 0.0 * log.time})
     assert without_packets(bare) is bare
 
 
 def rows_of(log, kept):
-    return RecordedLog("made", "made", "", {h: v[kept] for h, v in log.columns.items()})
+    return made({h: v[kept] for h, v in log.frame.items()})
 
 
 def numbers(words):
@@ -86,7 +94,7 @@ def test_packets_around_a_hole_stay_and_a_remark_says_where_it_is():
     log = packed()
     holed = rows_of(log, (log.time < 21.0) | (log.time > 21.5))  # nothing was recorded
     same = without_packets(holed)
-    assert same.columns is holed.columns
+    assert same.frame is holed.frame
     (words,) = same.remarks
     assert words.startswith("roll, pitch, yaw came in packets of 3 readings, and stay")
     assert "a hole from" in words
@@ -101,7 +109,7 @@ def test_packets_around_a_hole_stay_and_a_remark_says_where_it_is():
 def test_a_long_pause_neither_makes_packets_nor_hides_them():
     single, log = packed(packet=1), packed()
     for each in (single, log):
-        each.columns[TIME] = each.time + 100.0 * (each.time > 22.0)
+        each.frame[SECONDS] = each.time + 100.0 * (each.time > 22.0)
     assert without_packets(single) is single
     (words,) = without_packets(log).remarks
     assert "a hole from 22 to 122" in words
@@ -119,24 +127,22 @@ def test_of_several_holes_the_longest_is_told_with_their_number():
 def test_a_clock_that_becomes_slower_is_told_with_how_many_readings_are_off():
     log = packed()
     time = log.time + 0.05 * (log.time - 20.0) ** 2  # 0.8 s late in the end, never a hole
-    slow = RecordedLog("made", "made", "", {**log.columns, TIME: time})
+    slow = made({**log.frame, SECONDS: time})
     same = without_packets(slow)
-    assert same.columns is slow.columns
+    assert same.frame is slow.frame
     (words,) = same.remarks
     assert "hole" not in words
-    clock = packet_clock(time, log.table(ANGLES))
     _, off, count, allowed, farthest, at = numbers(words)
-    assert (off, count) == (clock.off, clock.readings)
-    assert 0 < off < count
+    assert 0 < off < count == pytest.approx(4.0 / PERIOD, abs=PACKET)
     assert farthest > allowed > 1e3 * PACKET * PERIOD  # [ms]
     assert time[0] <= at <= time[-1]
 
 
 def test_rows_without_angles_are_told_where_readings_came_in_packets():
     log = packed()
-    columns = {**log.columns, ANGLES[1]: log.columns[ANGLES[1]].copy()}
+    columns = {**log.frame, ANGLES[1]: log.frame[ANGLES[1]].copy()}
     columns[ANGLES[1]][1500:1520] = np.nan
-    (words,) = without_packets(RecordedLog("made", "made", "", columns)).remarks
+    (words,) = without_packets(made(columns)).remarks
     assert "20 rows have no reading, the first at 21.5 s" in words
     assert "off an even clock" not in words
 
@@ -147,6 +153,6 @@ def test_an_import_keeps_every_reading_where_rows_are_left_out(tmp_path):
     st = {"t_r": log.time, "epsilon_r": epsilon, "tensions_r": np.ones((4, len(log.time)))}
     savemat(tmp_path / "fast.mat", {"st": st})
     found = import_log(tmp_path / "fast.mat", every=5)
-    assert found.log.count == pytest.approx(len(log.time) / 5, abs=1)
-    assert off(found.log) < OFF
-    assert any("packets" in words for words in found.log.remarks)
+    assert len(found.frame) == pytest.approx(len(log.time) / 5, abs=1)
+    assert off(found) < OFF
+    assert any("packets" in words for words in found.remarks)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cdpr_drake.analyses.front.logs import replay_log
+from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -35,7 +35,7 @@ def written(tmp_path, offsets, shift=(0.0, 0.0, 0.0), tensions=False):
 
 
 def test_residuals_by_cable_are_the_errors_of_lengths(tmp_path):
-    found = replay_log(written(tmp_path, OFFSETS), "gt_graffiti")
+    found = replay_log(written(tmp_path, OFFSETS), robot="gt_graffiti")
     told = found.as_dict()["cables"]
     offsets = [told[f"C{k}"]["length_offset_m"] for k in (1, 2, 3, 4)]
     np.testing.assert_allclose(offsets, OFFSETS, atol=1e-8)
@@ -43,21 +43,21 @@ def test_residuals_by_cable_are_the_errors_of_lengths(tmp_path):
 
 
 def test_a_model_that_is_right_has_the_measured_poses(tmp_path):
-    found = replay_log(written(tmp_path, 0.0 * OFFSETS), "gt_graffiti")
+    found = replay_log(written(tmp_path, 0.0 * OFFSETS), robot="gt_graffiti")
     assert found.as_dict()["position_by_lengths_largest_m"] < 1e-7
 
 
 def test_the_frame_of_a_tracker_is_fitted_when_asked(tmp_path):
     path = written(tmp_path, 0.0 * OFFSETS, shift=(0.3, 0.1, -0.2))
-    assert replay_log(path, "gt_graffiti").as_dict()["position_by_lengths_rms_m"] > 0.3
-    found = replay_log(path, "gt_graffiti", fit_frame=True)
+    assert replay_log(path, robot="gt_graffiti").as_dict()["position_by_lengths_rms_m"] > 0.3
+    found = replay_log(path, robot="gt_graffiti", fit_frame=True)
     assert found.as_dict()["position_by_lengths_rms_m"] < 1e-6
-    np.testing.assert_allclose(found.replay.frame.translation(), [0.3, 0.1, -0.2], atol=1e-6)
+    np.testing.assert_allclose(found.frame.translation(), [0.3, 0.1, -0.2], atol=1e-6)
 
 
 def test_the_simulated_robot_follows_and_results_are_written(tmp_path):
     path = written(tmp_path, OFFSETS)
-    found = replay_log(path, "gt_graffiti", follow=True, folder=tmp_path / "out")
+    found = replay_log(path, robot="gt_graffiti", drive=True, out=tmp_path / "out")
     assert found.as_dict()["followed"]["position_error_largest_m"] < SMALL
     names = {entry.name for entry in (tmp_path / "out").iterdir()}
     assert {"summary.json", "replay.csv", "replay.html", "residuals.png"} <= names
@@ -69,4 +69,4 @@ def test_a_log_with_nothing_to_compare_is_refused(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("time_s,C1_length_m\n0,1\n1,1\n")
     with pytest.raises(CdprError, match="accepted for gt_graffiti: poses, or lengths"):
-        replay_log(path, "gt_graffiti")
+        replay_log(path, robot="gt_graffiti")

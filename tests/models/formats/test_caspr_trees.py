@@ -239,6 +239,23 @@ def test_a_tree_that_moves_no_mass_says_what_might_help(tmp_path):
     assert sum("principal moments" in words for words in imported.completed.remarks) == 2
 
 
+def test_links_without_any_inertia_are_not_sent_to_a_repair_that_was_tried(tmp_path):
+    none = "0 0 0 0 0 0"
+    model = Model(
+        [
+            Link("S_EULER_XYZ", "0 0 0", name="upper", com="0 0 0", inertia=none),
+            Link("R_Y", "0", 1, "0 0 0.4", "lower", com="0 0 0", inertia=none),
+        ],
+        [Cable([(0, "1 1 1"), (2, "0.1 0 0.1")])],
+    )
+    path = model.write(tmp_path)
+    with pytest.raises(RobotFileError) as caught:
+        import_mechanism(path, repair_inertia=True)
+    words = str(caught.value)
+    assert words.endswith("accepted: moments of inertia above 0 in the file, of upper, lower")
+    assert "repair" not in words
+
+
 def test_a_pulley_at_the_base_is_one_here(tmp_path):
     model = two_link()
     model.cables[1].points[0] = (

@@ -34,10 +34,10 @@ ASKED = {
     "plan_free_motion": lambda robot: cdpr.plan_free_motion(robot, None, None),
     "plan_proven_motion": lambda robot: cdpr.plan_proven_motion(robot, None, None),
     "reconfigure": lambda robot: cdpr.reconfigure(robot, poses=[None]),
-    "replay_log": lambda robot: cdpr.replay_log("log.csv", robot),
+    "replay_log": lambda robot: cdpr.replay_log("log.csv", robot=robot),
     "calibrate": lambda robot: cdpr.calibrate(robot, "log.csv"),
     "identify": lambda robot: cdpr.identify(robot, "log.csv"),
-    "identify_free_motion": lambda robot: cdpr.identify_free_motion(robot, "log.csv"),
+    "identify_swings": lambda robot: cdpr.identify_swings(robot, "log.csv"),
     "export_robot": lambda robot: cdpr.export_robot(robot, "mjcf"),
 }
 """Questions of the front door about a robot."""
@@ -115,6 +115,7 @@ COMMANDS = [
     ["design", NAME, "--goal", "wrench-feasible"],
     ["calibrate", NAME, "log.csv"],
     ["identify", NAME, "log.csv"],
+    ["identify-swings", NAME, "log.csv"],
     ["new", "robot", "mine", "--from", NAME],
     ["studio", NAME, "--no-browser"],
     ["simulate", "acrobot_pbvs", "--set", f"robot={NAME}"],

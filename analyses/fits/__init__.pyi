@@ -1,0 +1,11 @@
+from .calibration import Calibration as Calibration
+from .calibration import calibration_fit as calibration_fit
+from .calibration import fit_robot as fit_robot
+from .campaign import Scene as Scene
+from .fit import Fit as Fit
+from .fit import Unknown as Unknown
+from .prediction import next_poses as next_poses
+from .robots import calibrated_robot as calibrated_robot
+from .robots import calibration_model as calibration_model
+from .setup import CalibrationTask as CalibrationTask
+from .setup import Sigmas as Sigmas

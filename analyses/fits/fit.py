@@ -1,0 +1,265 @@
+"""A fit of a model to measurements: one class for geometry, dynamics, swings and cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydrake.common.yaml import yaml_dump_typed
+
+from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
+from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.logs.measurements import Measurements
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.arrays import Array
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.errors import CalibrationError, IdentificationError
+from cdpr_drake.identification.result import IdentificationResult
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.numerics.time_shift import WORSE
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RESULTS, ROBOT = "results.json", "robot.yaml"
+"""Files of a results folder: all numbers, and the robot as it is believed now."""
+
+MISFIT, MISFIT_CODE = "misfit", 6
+"""Status of a fit that does not explain what was measured, and the exit code of its command."""
+
+MISFIT_FACTOR = 3.0
+"""Residuals of so many sigmas, root mean square, are no fit."""
+
+LATE = 0.25
+"""A clock is off by more than this share of the time between rows."""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A parameter that was fitted.
+
+    Attributes:
+        name: Its name, such as C3.exit_point.z.
+        unit: Its unit.
+        std: Standard deviation; not finite if the measurements do not tell it.
+        value: Its value; None where `change` is.
+        change: Its change.
+        before: As it was believed before; None if nothing was.
+        true: As it truly is, in a simulation; None if that is unknown.
+    """
+
+    name: str
+    unit: str
+    std: float
+    value: float | None = None
+    change: float | None = None
+    before: float | None = None
+    true: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON, without what is None."""
+        return {key: finite(value) for key, value in asdict(self).items() if value is not None}
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Fit(Result):
+    """A model that was fitted to measurements.
+
+    Attributes:
+        title: What was fitted, such as "Calibration of acrobot_small".
+        model: The fitted `Robot` or `Camera`.
+        status: How the search ended, or `MISFIT`.
+        unknowns: The fitted parameters.
+        spread: Residuals over sigma, root mean square; None if the residuals tell sigma.
+        residuals: Numbers by kind of measurement, such as `count` and `rms_sigmas`.
+        misfit: Reasons why it is no fit, in words; empty if it is one.
+        covariance: Of the unknowns, shape (f, f); None if it is not computed.
+        held_out: Measurements that were predicted and not fitted; None if all were fitted.
+        remarks: Sentences that a user should know.
+        details: Further numbers for JSON, under their keys.
+        shown: Its tables.
+        drawings: Functions that draw its figures, by name; the most telling one is first.
+        texts: Further files of its results folder, by name.
+        writer: Writes further files into a folder; None if there are none.
+        model_file: Name of the model's file there.
+        result: Solution of the room of mathematics, such as a `CalibrationResult`.
+        source: What the fit is made of, for verbs that go on with it.
+        folder: Its results folder; None if nothing is kept.
+        failed: Of each file that could not be written, its name and why.
+    """
+
+    title: str
+    model: Any
+    status: str
+    unknowns: tuple[Unknown, ...]
+    spread: float | None
+    residuals: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    misfit: tuple[str, ...] = ()
+    covariance: Array | None = None
+    held_out: Any = None
+    remarks: tuple[str, ...] = ()
+    details: Mapping[str, Any] = field(default_factory=dict)
+    shown: tuple[Table, ...] = ()
+    drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
+    writer: Callable[[Path], None] | None = None
+    model_file: str = ROBOT
+    result: Any = None
+    source: Any = None
+    folder: Path | None = None
+    failed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def fits(self) -> bool:
+        """True if the model explains the measurements."""
+        return self.status != MISFIT
+
+    @property
+    def exit_code(self) -> int:
+        """Of a command; `MISFIT_CODE` for a misfit."""
+        return 0 if self.fits else MISFIT_CODE
+
+    @cached_property
+    def correlation(self) -> Array | None:
+        """Correlation of the unknowns, shape (f, f); None without a covariance."""
+        if self.covariance is None:
+            return None
+        root = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        scale = np.where(root > 0.0, root, np.inf)
+        return np.asarray(self.covariance / np.outer(scale, scale))
+
+    def as_dict(self) -> dict[str, Any]:
+        """All numbers for JSON."""
+        numbers: dict[str, Any] = {
+            "status": self.status,
+            "parameters": [unknown.as_dict() for unknown in self.unknowns],
+            "remarks": list(self.remarks),
+            "versions": package_versions(),
+        }
+        if self.spread is not None:
+            numbers["residuals_over_sigma"] = finite(self.spread)
+            numbers["misfit_factor"] = MISFIT_FACTOR
+        if self.covariance is not None and self.correlation is not None:
+            numbers["covariance"] = finite(self.covariance.tolist())
+            numbers["correlation"] = finite(self.correlation.tolist())
+        return {**numbers, **self.details}
+
+    def tables(self) -> Sequence[Table]:
+        """Its tables."""
+        return self.shown
+
+    def lines(self) -> list[str]:
+        """Where the results are."""
+        return [] if self.folder is None else [f"results: {shown_path(self.folder)}"]
+
+    def notes(self) -> list[str]:
+        """That only figures are missing."""
+        if self.folder is None or not self.failed:
+            return []
+        return [f"The data is complete in {shown_path(self.folder)}"]
+
+    def figures(self) -> Mapping[str, Callable[[], Figure]]:
+        """Functions that draw its figures, by name."""
+        return self.drawings
+
+    def write(self, folder: Folder) -> None:
+        """Writes numbers, the fitted model and further files."""
+        folder.write_json(RESULTS, self.as_dict())
+        folder.write_text(self.model_file, yaml_dump_typed(self.model))
+        for name, words in self.texts.items():
+            folder.write_text(name, words)
+        if self.writer is not None:
+            with folder.files() as stage:
+                self.writer(stage)
+
+    def with_more(
+        self, tables: Sequence[Table] = (), *, details: Mapping[str, Any] | None = None,
+        drawings: Mapping[str, Callable[[], Figure]] | None = None,
+        texts: Mapping[str, str] | None = None,
+    ) -> Fit:  # fmt: skip
+        """The same fit with further tables, numbers, figures and files."""
+        return replace(
+            self, shown=(*self.shown, *tables), details={**self.details, **(details or {})},
+            drawings={**self.drawings, **(drawings or {})}, texts={**self.texts, **(texts or {})},
+        )  # fmt: skip
+
+
+def kept_fit(
+    name: str, arguments: Mapping[str, Any], work: Callable[[], Fit], *,
+    folder: Path | str | None, overwrite: bool, formats: Sequence[str], follow: Follow,
+) -> Fit:  # fmt: skip
+    """A fit in its results folder, if one is kept.
+
+    Args:
+        name: Name of a new folder below runs/, if none is given and `follow` keeps results.
+        arguments: All that the results depend on, for JSON.
+        work: Computes the fit.
+        folder: The folder.
+        overwrite: True if other results in the folder may be replaced.
+        formats: Formats of figures.
+        follow: Who follows.
+
+    Raises:
+        OutputFolderError: The folder holds other results or files, or cannot be written.
+        StoppedError: It was stopped.
+    """
+    kept = f"runs/{name}"
+    with results_folder(kept, arguments, folder, overwrite, follow.results) as results:
+        fit = work()
+        if results is None:
+            return fit
+        fit = replace(fit, folder=results.path)
+        write_result(fit, results, formats, follow)
+        return fit
+
+
+def notes_table(notes: Sequence[tuple[str, str]]) -> list[Table]:
+    """A table of notes, each with a word for what it is; none without notes."""
+    return [Table("To know", ("what", "which"), notes)] if notes else []
+
+
+def fitted_robot(
+    robot: Robot, done: str, result: CalibrationResult | IdentificationResult, **changes: Any
+) -> Robot:
+    """A robot with what was found, and words of it among what its file assumes.
+
+    Args:
+        robot: As it was believed.
+        done: What was done with it, as "Calibrated".
+        result: What was found.
+        changes: Its new fields.
+    """
+    words = f"{done}: {result.status}, {len(result.names)} parameters."
+    return replace(robot, **changes, assumptions=f"{robot.assumptions} {words}".strip())
+
+
+def refuse_late_tracker(
+    log: Measurements, against: str, found: tuple[float, float], step: float,
+    error: type[CalibrationError] | type[IdentificationError],
+) -> None:  # fmt: skip
+    """Refuses a tracker that is out of sync.
+
+    Args:
+        log: The log with its poses.
+        against: What they were compared with.
+        found: By how much they are late [s], and how many times better they fit with that shift.
+        step: Time between rows [s].
+        error: What is raised.
+
+    Raises:
+        CalibrationError: It is, or an IdentificationError; says by how much.
+    """
+    shift, better = found
+    if better > WORSE and abs(shift) > LATE * step:
+        late = "late" if shift > 0.0 else "early"
+        raise error(
+            f"{log.path}: tracker: found it {abs(shift):.4g} s {late} against the {against}, "
+            f"which fit {better:.2g} times better with that shift; accepted: the same clock, or "
+            f"tracker_late {shift:.4g}"
+        )

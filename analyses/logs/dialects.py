@@ -1,0 +1,270 @@
+"""How recorders write logs: a table of dialects, and how a file's dialect is recognised.
+
+A dialect of text with columns is data: a pattern of its first line, and patterns of headers with
+the headers and units that they stand for. A dialect that is no table has a function that makes one.
+Units, names, axes, times and refusals are those of `assemble`, once for all.
+
+Sources: OptiTrack, Data Export: CSV, docs.optitrack.com; wiki.ros.org/rostopic, echo -p; the others
+stand at the functions that read them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cdpr_drake.analyses.logs import machines, other_files
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
+from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
+from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
+from cdpr_drake.analyses.logs.text import (
+    plain_text,
+    read_bytes,
+    read_cells,
+    read_text,
+    separator_of,
+    split_line,
+)
+from cdpr_drake.errors import LogFileError, accepted_names
+
+AUTO, CSV = "auto", "csv"
+
+HEAD = 60_000
+"""Bytes at the top of a file by which it is recognised."""
+
+Headers = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a recorder writes.
+
+    Attributes:
+        title: What it writes, in words.
+        knows: Why the beginning of a file, text or bytes, is of this dialect; empty if it is not.
+        read: Makes a log of path, text and facts; None: text with columns, see `columns`.
+        columns: Patterns of whole headers, and the headers with units that they stand for, with
+            {} for the first group; an empty one leaves columns out.
+        binary: True if files are no text; `read` then gets an empty text.
+    """
+
+    title: str
+    knows: Callable[[Any], str]
+    read: Callable[[Path, str, Facts], Log] | None = None
+    columns: Headers = ()
+    binary: bool = False
+
+
+def first_line(pattern: str) -> Callable[[str], str]:
+    """Recognises text by a part of its first line."""
+
+    def knows(head: str) -> str:
+        found = re.search(pattern, head.partition("\n")[0])
+        return f"its first line has {found[0].strip(',')!r}" if found else ""
+
+    return knows
+
+
+def magic(raw: bytes, words: str = "") -> Callable[[bytes], str]:
+    """Recognises files by their first bytes."""
+    return lambda head: f"it begins with {words or raw.decode()}" if head.startswith(raw) else ""
+
+
+def knows_columns(head: str) -> str:
+    """Recognises text whose first row has known headers and whose second row has numbers."""
+    lines = [line for line in head.split("\n") if line.strip() and not line.startswith("#")][:2]
+    if len(lines) < 2 or not re.search(r"[A-Za-z_]", lines[0]):
+        return ""
+    separator = separator_of(lines[0])
+    cells, below = (split_line(line, separator) for line in lines)
+    values = [
+        is_number(cell, "," if separator not in (",", None) and "," in cell else ".")
+        for cell in below
+    ]
+    names = ["C" + str(k + 1) for k in range(MOST_CABLES)] + cable_names(cells)
+    known = [cell for cell in cells if read_header(cell, names) is not None]
+    if not known or len(below) != len(cells) or sum(values) < 0.5 * len(values):
+        return ""
+    return f"its first row has the headers {', '.join(known[:3])}"
+
+
+def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
+    """Text with columns, by its headers, the patterns of its dialect, or a mapping.
+
+    Raises:
+        LogFileError: It has no headers and no mapping says what its columns are, no column is
+            known, two say the same, or a cell is no number; names line and column.
+    """
+    cells = read_cells(path, text, facts.separator, facts.skip_rows)
+    rows, mapping, remarks = cells.rows, facts.mapping, list[str]()
+    width, m = len(rows[0]), len(facts.cables or facts.robot_cables)
+    headed = not all(is_number(cell, cells.decimal) for cell in rows[0])
+    why = "columns as the mapping says"
+    if headed and len(rows) < 2:
+        raise LogFileError(f"{path}: found a header without rows; accepted: one row at least")
+    if isinstance(mapping, dict) and headed:
+        missing = [name for name in mapping if name not in rows[0]]
+        if missing:
+            raise LogFileError(
+                f"{path}: mapping: columns: found {missing[0]!r}; accepted: "
+                f"{', '.join(rows[0])[:120]}"
+            )
+        headers = [mapping.get(name, "") for name in rows[0]]
+    elif mapping is not None and not isinstance(mapping, dict):
+        if len(mapping) != width:
+            raise LogFileError(
+                f"{path}: mapping: columns: found {len(mapping)}; accepted: {width}, one for each "
+                "column"
+            )
+        headers = list(mapping)
+    elif headed:
+        why = DIALECTS[dialect].knows(text) or "it has headers"
+        headers = [_header(cell, DIALECTS[dialect].columns) for cell in rows[0]]
+    elif m and width in (m, 2 * m):  # as GRAB's tools write
+        why = f"it has {width} columns of numbers for {m} cables"
+        names = facts.cables or facts.robot_cables
+        kinds = ("length_m", "swivel_rad")[: width // m]
+        headers = [f"{name}_{kind}" for kind in kinds for name in names]
+        remarks.append("no header: lengths [m]" + (" and swivel angles [rad]" if width > m else ""))
+    else:
+        accepted = f"{m} lengths, or {m} lengths and {m} swivel angles, " if m else ""
+        raise LogFileError(
+            f"{path}: found {width} columns of numbers without a header; accepted: {accepted}a "
+            "header, or a mapping with a list of columns"
+        )
+    read = [j for j, header in enumerate(headers) if header]
+    return assemble(
+        path, dialect, why, [(headers[j], [row[j] for row in rows[headed:]]) for j in read], facts,
+        shown=[rows[0][j] for j in read] if headed and mapping is None else None,
+        lines=cells.lines[headed:], remarks=remarks, decimal=cells.decimal,
+        left_out={
+            rows[0][j] if headed else f"column {j + 1}": LEFT_OUT
+            for j, header in enumerate(headers) if not header
+        },
+    )  # fmt: skip
+
+
+def _header(cell: str, patterns: Headers) -> str:
+    """The header with a unit for which one of a file stands."""
+    for pattern, target in patterns:
+        found = re.fullmatch(pattern, cell)
+        if found:
+            return target.format(*found.groups())
+    return cell
+
+
+ROS_COLUMNS: Headers = (
+    (r"%time|(?:field\.)?header\.stamp", "time_ns"), (r"__time", "time_s"),
+    (r"(?:.*[./])?(?:position|translation|point)[./]([xyz])", "{}_m"),
+    (r"(?:.*[./])?(?:orientation|rotation|quaternion)[./]([xyzw])", "q{}"),
+    (r"(?:.*[./])?position(?:\.|\[)?(\d+)\]?", "cable{}_motor_rad"),
+    (r"(?:.*[./])?effort(?:\.|\[)?(\d+)\]?", "cable{}_torque_nm"),
+    (r"(?:.*[./])?(?:header[./].*|name\d*|child_frame_id|velocity.*)", ""),
+)  # fmt: skip
+"""rostopic echo -p writes field.pose.position.x, PlotJuggler /topic/pose/position/x; joints are
+position0, position1, ..."""
+
+DIALECTS = {
+    "hangprinter": Dialect(
+        "a Hangprinter's series: motor_pos_samp, xyz_of_samp, force_samp",
+        machines.knows_hangprinter, machines.read_hangprinter,
+    ),
+    "maslow": Dialect(
+        "a Maslow's CLBM lines, of its calibration", machines.knows_maslow, machines.read_maslow
+    ),
+    "grab": Dialect(
+        "GRAB's raw log: lines type,time,...", machines.knows_grab, machines.read_grab
+    ),
+    "gtgraffiti": Dialect(
+        "GTGraffiti's controller: mode: x y - x y | ...", machines.knows_graffiti,
+        machines.read_graffiti,
+    ),
+    "motive": Dialect("OptiTrack Motive's CSV", knows_motive, read_motive),
+    "ros": Dialect(
+        "text of ROS: rostopic echo -p, PlotJuggler", first_line(r"^(%time|__time),"),
+        columns=ROS_COLUMNS,
+    ),
+    CSV: Dialect("text with columns, with headers or a mapping", knows_columns),
+    "mat": Dialect(
+        "GRAB's parsed .mat, or any with a mapping", magic(other_files.MAT), other_files.read_mat,
+        binary=True,
+    ),
+    "mcap": Dialect(
+        "MCAP with messages in JSON, as runs leave it",
+        magic(other_files.MCAP, "the magic bytes of MCAP"), other_files.read_mcap, binary=True,
+    ),
+}  # fmt: skip
+"""Dialects by the name of `--log-format`."""
+
+
+def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) -> Log:
+    """Reads a log of a machine.
+
+    Args:
+        path: The file.
+        facts: What is known of it besides; None: nothing.
+        dialect: A name of `DIALECTS`; `auto`: recognised by the file.
+
+    Raises:
+        LogFileError: There is no such dialect, none or several fit the file, or it is damaged; one
+            line.
+    """
+    path, facts = Path(path), Facts() if facts is None else facts
+    if not path.is_file() or not path.stat().st_size:
+        what = "a folder" if path.is_dir() else "an empty file" if path.exists() else "no such file"
+        raise LogFileError(f"{path}: found {what}; accepted: a log")
+    if dialect not in (AUTO, *DIALECTS):
+        raise LogFileError(
+            f"log format: found {dialect!r}; {accepted_names(dialect, (*DIALECTS, AUTO))}"
+        )
+    name = dialect if dialect != AUTO else recognise(path)[0]
+    if not name and facts.mapping is None and not facts.robot_cables:
+        raise LogFileError(
+            f"{path}: found a file that no reader of logs recognises; accepted: "
+            f"{', '.join(DIALECTS)}, named by log_format; columns of numbers without a header "
+            "need a mapping"
+        )
+    how = DIALECTS[name or CSV]
+    text = "" if how.binary else read_text(path)
+    if dialect not in (AUTO, CSV) and not how.knows(read_bytes(path, HEAD) if how.binary else text):
+        start = "" if how.binary else f" {text[:30]!r} at the top"
+        raise LogFileError(f"{path}: found{start or ' other bytes'}; accepted: {how.title}")
+    if how.read is not None:
+        return how.read(path, text, facts)
+    return columns_log(path, text, facts, name or CSV)
+
+
+def recognise(path: Path) -> tuple[str, str]:
+    """Name of the dialect of a file, and why; empty if none fits.
+
+    `csv`, whose headers others have too, counts where no other dialect fits.
+
+    Raises:
+        LogFileError: The file cannot be read, or several dialects fit.
+    """
+    raw = read_bytes(path, HEAD)
+    text = plain_text(raw, "ignore")
+    if text is not None and len(raw) == HEAD:
+        text = text.rpartition("\n")[0]
+    fits: dict[str, str] = {}
+    for name, how in DIALECTS.items():
+        head = raw if how.binary else text
+        if head is not None and not (name == CSV and fits):
+            why = how.knows(head)
+            fits |= {name: why} if why else {}
+    if len(fits) > 1:
+        words = "; ".join(f"{name}, as {why}" for name, why in fits.items())
+        raise LogFileError(
+            f"{path}: found a file that several readers recognise: {words}; accepted: one of them, "
+            "named by log_format"
+        )
+    return next(iter(fits.items()), ("", ""))
+
+
+def formats_words() -> Sequence[str]:
+    """A line on each dialect, for the help."""
+    return [f"- {name}: {how.title}" for name, how in DIALECTS.items()]

@@ -1,0 +1,207 @@
+"""The verb import_log: a log of any recorder as one that all commands read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from cyclopts import Parameter
+
+from cdpr_drake.analyses.frame.verb import verb
+from cdpr_drake.analyses.frame.words import (
+    InputFile,
+    Names,
+    RobotWord,
+    Switch,
+    one_of,
+    whole,
+    words,
+)
+from cdpr_drake.analyses.logs.clocks import join_logs, without_packets
+from cdpr_drake.analyses.logs.columns import COMMANDED, ESTIMATED, UNITS
+from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, formats_words, read_log
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log
+from cdpr_drake.analyses.logs.text import with_mapping
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import CdprError, LogFileError, OutputFolderError, accepted_names
+from cdpr_drake.models.robot_loader import as_robot
+
+DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
+
+
+def checked_units(units: Mapping[str, str]) -> dict[str, str]:
+    """Units by dimension, in small letters.
+
+    Raises:
+        LogFileError: There is no such dimension, or the unit is of another one.
+    """
+    checked = {}
+    for dimension, unit in units.items():
+        known = [name for name, (of, _) in UNITS.items() if of == dimension]
+        if not known:
+            raise LogFileError(
+                f"unit: found {dimension!r}; {accepted_names(dimension, DIMENSIONS)}"
+            )
+        if unit.lower() not in known:
+            raise LogFileError(
+                f"unit of {dimension}: found {unit!r}; {accepted_names(unit, known)}"
+            )
+        checked[dimension] = unit.lower()
+    return checked
+
+
+def axes_rotation(word: str) -> Array:
+    """R_WF from which axes of the file x, y and z of W are, as `z,x,y` or `-z,-x,y`.
+
+    Raises:
+        LogFileError: They are not three different axes, or would mirror the motion.
+    """
+    R = np.zeros((3, 3))
+    parts = [part.strip().lower() for part in word.split(",")]
+    for row, part in enumerate(parts[:3]):
+        name = part.lstrip("+-")
+        if name in ("x", "y", "z"):
+            R[row, "xyz".index(name)] = -1.0 if part.startswith("-") else 1.0
+    if len(parts) != 3 or not np.isclose(np.linalg.det(R), 1.0):
+        raise LogFileError(
+            f"axes: found {word!r}; accepted: the axes of the file that are x, y and z of W, "
+            "right-handed, as z,x,y or x,-z,y"
+        )
+    return R
+
+
+def _units(word: str) -> dict[str, str]:
+    pairs = [item.strip().partition("=") for item in word.split(",")]
+    if not all(mark for _, mark, _ in pairs):
+        raise ValueError(word)
+    return checked_units({dimension: unit for dimension, _, unit in pairs})
+
+
+def _rate(word: str) -> float:
+    rate = float(word)
+    if not 0.0 < rate < np.inf:
+        raise ValueError(word)
+    return rate
+
+
+LogFormat: TypeAlias = Annotated[str, one_of((*DIALECTS, AUTO))]
+Units: TypeAlias = Annotated[
+    Mapping[str, str] | None,
+    words(_units, "DIMENSION=UNIT, as length=mm, or several with commas", "DIMENSION=UNIT,..."),
+]
+MappingFile: TypeAlias = Annotated[
+    Path | str | None, words(Path, "the path of a YAML file", "FILE")
+]
+Rate: TypeAlias = Annotated[float | None, words(_rate, "above 0 [1/s]", "RATE")]
+Axes: TypeAlias = Annotated[Any, words(axes_rotation, "three axes, as -z,-x,y", "AXIS,AXIS,AXIS")]
+OutFile: TypeAlias = Annotated[Path | str | None, words(Path, "the path of a file", "FILE")]
+
+
+def facts_of(
+    cables: Sequence[str] | None = None, *, unit: Mapping[str, str] | None = None,
+    mapping: Path | str | None = None, rate: float | None = None, body: str | None = None,
+    axes: Any = None,
+) -> Facts:  # fmt: skip
+    """What is known of a log beside its file; arguments as of `import_log`.
+
+    Raises:
+        LogFileError: A unit, a rate, axes or a mapping is not accepted, or names of cables are
+            empty or the same.
+    """
+    if cables is not None and (not all(cables) or len(set(cables)) < len(cables)):
+        raise LogFileError(
+            f"cables: found {', '.join(cables)!r}; accepted: different names, as A,B,C,D"
+        )
+    if rate is not None and not 0.0 < rate < np.inf:
+        raise LogFileError(f"rate: found {rate!r}; accepted: above 0 [1/s]")
+    facts = Facts(
+        cables=None if cables is None else tuple(cables), units=checked_units(unit or {}),
+        rate=rate, body=body, R_WF=axes_rotation(axes) if isinstance(axes, str) else axes,
+    )  # fmt: skip
+    return facts if mapping is None else with_mapping(facts, Path(mapping))
+
+
+@verb()
+def import_log(
+    file: InputFile, /, *, out: OutFile = None,
+    beside: Annotated[Path | None, Parameter(name="--with")] = None,
+    log_format: LogFormat = AUTO, with_format: LogFormat = AUTO, robot: RobotWord = None,
+    cables: Names | None = None, unit: Units = None, mapping: MappingFile = None,
+    rate: Rate = None, body: str | None = None, axes: Axes = None,
+    start: Annotated[float | None, Parameter(name="--from")] = None, until: float | None = None,
+    every: Annotated[int, whole(1)] = 1, overwrite: Switch = False,
+) -> Log:  # fmt: skip
+    """Reads a log as a machine or a tracker wrote it, and writes one that calibrate and identify
+    take.
+
+    READERS
+
+    --with FILE is what another recorder wrote of the same motion: its clock is read as the first
+    one's, and shift and drift are told with their standard deviations. Without --out it says what
+    is in the log, and what became of each column of the file.
+
+    Args:
+        file: The log.
+        out: CSV file to write.
+        beside: Log of the same motion by another recorder.
+        log_format: Reader; auto says which and why.
+        with_format: Reader of the other log.
+        robot: Robot whose cable names the columns take.
+        cables: Names of the cables in the order of the log, as A,B,C,D.
+        unit: Units that the file does not state, as length=mm,force=N.
+        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
+            header; skip_rows, separator, rate_hz.
+        rate: Rows per second, for files without times [1/s].
+        body: Rigid body of a tracker that is the platform.
+        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
+        start: First instant [s].
+        until: Last instant [s].
+        every: Keep every n-th row.
+        overwrite: Replace the file.
+
+    Raises:
+        LogFileError: A file or an argument is not accepted; one line.
+        ClockError: Both logs are not of one motion, or it repeats itself.
+        OutputFolderError: The file to write is one of the logs, is there, or cannot be written.
+    """
+    target = None if out is None else Path(out)
+    for source in (file, beside):
+        if target is not None and source is not None and target.resolve() == Path(source).resolve():
+            raise OutputFolderError(f"out: found {out}, the log itself; accepted: another file")
+    if target is not None and target.exists() and not overwrite:
+        raise OutputFolderError(f"out: found {out}; accepted: a new file, or add overwrite")
+    if robot is not None and cables is not None:
+        raise CdprError("cables: found with robot; accepted: one of them")
+    if robot is not None:
+        cables = [cable.name for cable in as_robot(robot, "import_log").cables]
+    facts = facts_of(cables, unit=unit, mapping=mapping, rate=rate, body=body, axes=axes)
+    log = without_packets(read_log(file, facts, log_format))
+    idle = _idle(log, facts)
+    if beside is not None:
+        second = read_log(beside, replace(facts, mapping=None, skip_rows=0, separator=None),
+                          with_format)  # fmt: skip
+        idle = [remark for remark in idle if remark in _idle(second, facts)]
+        log = join_logs(log, without_packets(second))
+    log = log.with_remarks(*(f"not used: {remark}" for remark in idle)).part(start, until, every)
+    if target is not None:
+        log.write(target)
+    return replace(log, written=target)
+
+
+import_log.__doc__ = (import_log.__doc__ or "").replace("READERS", "\n    ".join(formats_words()))
+
+
+def _idle(log: Log, facts: Facts) -> list[str]:
+    """What was said beside a file and changed nothing, and why."""
+    idle = []
+    if facts.rate is not None and not log.units.get("time", "").endswith(f"rows/s, {AS_TOLD}"):
+        idle.append(f"a rate of {facts.rate:g} 1/s, since the file has times")
+    if facts.body is not None and log.dialect != "motive":
+        idle.append(f"the rigid body {facts.body}, since only motive files have some")
+    stems = [name.removeprefix(COMMANDED).removeprefix(ESTIMATED) for name in log.frame]
+    if facts.cables and not any(s.startswith(f"{c}_") for c in facts.cables for s in stems):
+        idle.append(f"the cables {', '.join(facts.cables)[:80]}, since no column is of one")
+    return idle

@@ -1,0 +1,201 @@
+"""Text of recorders of all kinds: codings, line ends, separators, decimal marks, mappings."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cdpr_drake.analyses.logs.log import Facts
+from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
+from cdpr_drake.schema.input_files import file_size
+from cdpr_drake.schema.yaml_files import load_yaml
+
+MOST_BYTES, MOST_MAPPING = 500_000_000, 1_000_000
+"""Of a log, and of a mapping file; a minute of a hundred columns at 1 kHz has a tenth of that."""
+
+SEPARATORS = (";", "\t", ",")
+"""Signs between cells; where none of them is, blanks are."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Cells of a text, all rows as long as the first.
+
+    Attributes:
+        rows: The cells.
+        lines: Line of the file in which each row stands.
+        decimal: Mark in numbers, "." or ",".
+    """
+
+    rows: list[list[str]]
+    lines: list[int]
+    decimal: str
+
+
+def plain_text(raw: bytes, errors: str = "strict") -> str | None:
+    """Text with one kind of line ends; None if bytes are no text; errors as of `bytes.decode`."""
+    wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if not wide and b"\0" in raw:
+        return None
+    text = raw.decode("utf-16" if wide else "utf-8-sig", errors)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, most: int = -1) -> bytes:
+    """Bytes of a file, or its first ones.
+
+    Raises:
+        LogFileError: It cannot be read, or is too large.
+    """
+    try:
+        if file_size(path) > MOST_BYTES:
+            raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
+        with path.open("rb") as file:
+            return file.read(most)
+    except OSError as problem:
+        raise LogFileError(f"{path}: cannot be read: {problem.strerror}") from problem
+
+
+def read_text(path: Path) -> str:
+    """Text of a file.
+
+    Raises:
+        LogFileError: It cannot be read, is too large, or is no text.
+    """
+    try:
+        text = plain_text(read_bytes(path))
+    except UnicodeDecodeError as problem:
+        raise LogFileError(
+            f"{path}: found byte {problem.start} that is not of {problem.encoding}; accepted: text "
+            "in UTF-8"
+        ) from problem
+    if text is None:
+        raise LogFileError(f"{path}: found bytes that are no text; accepted: text")
+    return text
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Cells of a line; no separator: blanks."""
+    if separator is None:
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+
+
+def separator_of(line: str) -> str | None:
+    """The separator of a line; None: blanks."""
+    return next((sign for sign in SEPARATORS if sign in line), None)
+
+
+def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 0) -> Cells:
+    """Cells of a text; lines that are empty or begin with # are left out.
+
+    Args:
+        path: The file, for messages.
+        text: Its content.
+        separator: Sign between cells; None: by the first row.
+        skip: Lines to leave out at the top.
+
+    Raises:
+        LogFileError: There are no rows, or one has another number of cells than the first.
+    """
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), 1)
+        if number > skip and line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise LogFileError(f"{path}: found no rows; accepted: rows of measurements")
+    separator = separator or separator_of(numbered[0][1])
+    lines = [number for number, _ in numbered]
+    try:
+        if separator is None:
+            rows = [line.split() for _, line in numbered]
+        else:
+            found = csv.reader([line for _, line in numbered], delimiter=separator)
+            rows = [[cell.strip() for cell in row] for row in found]
+    except csv.Error as problem:
+        raise LogFileError(f"{path}: cannot be read as a table: {problem}") from problem
+    if len(rows) != len(lines):
+        raise LogFileError(f"{path}: found quotes round a line end; accepted: a row a line")
+    width = len(rows[0])
+    for row, number in zip(rows, lines, strict=True):
+        while len(row) > width and not row[-1]:  # a separator at the end of the line
+            row.pop()
+        if len(row) != width:
+            raise LogFileError(
+                f"{path}:{number}: found {len(row)} cells; accepted: {width}, as in line {lines[0]}"
+            )
+    return Cells(rows, lines, _decimal(rows, separator))
+
+
+def _decimal(rows: Sequence[Sequence[str]], separator: str | None) -> str:
+    """A comma if some cells have one, none has a point, and something else separates cells."""
+    if separator == ",":
+        return "."
+    cells = [cell for row in rows[:200] for cell in row]
+    comma = r"[+-]?(\d{1,3}(\.\d{3})+|\d*),\d+([eE][+-]?\d+)?"
+    point = r"[+-]?(\d{1,3}(,\d{3})+|\d*)\.\d+([eE][+-]?\d+)?"
+    with_comma, with_point = (
+        any(re.fullmatch(pattern, cell) for cell in cells) for pattern in (comma, point)
+    )
+    return "," if with_comma and not with_point else "."
+
+
+class _Mapping(BaseModel):
+    """Content of a mapping file."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    columns: list[str | None] | dict[str, str | None] = Field(min_length=1)
+    skip_rows: int = Field(0, ge=0)
+    separator: str | None = Field(None, pattern=r'^[^"\n\r.]$')
+    rate_hz: float | None = Field(None, gt=0.0, allow_inf_nan=False)
+
+
+_ACCEPTED = {
+    "columns": "a list of headers with their units, as [time_s, C1_length_mm, ''], or name: header",
+    "skip_rows": "a whole number from 0", "separator": "one sign, as ';'",
+    "rate_hz": "a number above 0",
+}  # fmt: skip
+
+
+def with_mapping(facts: Facts, path: Path) -> Facts:
+    """Facts with what a mapping file says: YAML with columns, skip_rows, separator, rate_hz.
+
+    Raises:
+        LogFileError: It cannot be read, or says something else.
+    """
+    try:
+        if file_size(path) > MOST_MAPPING:
+            raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
+        content = load_yaml(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        words = " ".join(why_not_read(problem).split())
+        raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
+    try:
+        mapping = _Mapping.model_validate(content)
+    except ValidationError as problem:
+        key = str((*problem.errors()[0]["loc"], "columns")[0])
+        if key not in _ACCEPTED:
+            raise LogFileError(
+                f"{path}: found {key!r}; {accepted_names(key, _ACCEPTED)}"
+            ) from problem
+        value = content.get(key) if isinstance(content, dict) else content
+        raise LogFileError(
+            f"{path}: {key}: found {str(value)[:80]}; accepted: {_ACCEPTED[key]}"
+        ) from problem
+    headers: Any = mapping.columns
+    if isinstance(headers, dict):
+        headers = {name: header or "" for name, header in headers.items()}
+    else:
+        headers = [header or "" for header in headers]
+    return replace(
+        facts, mapping=headers, skip_rows=mapping.skip_rows, separator=mapping.separator,
+        rate=mapping.rate_hz if facts.rate is None else facts.rate,
+    )  # fmt: skip
