@@ -34,7 +34,9 @@ def log():
 
 
 def task(log, rest=None):
-    return CalibrationTask(load_robot("irma4u"), log, ("length_offsets",), rest=rest)
+    return CalibrationTask(
+        robot=load_robot("irma4u"), log=log, unknown=("length_offsets",), rest=rest
+    )
 
 
 def test_each_stop_is_a_row_with_its_means(log):
