@@ -65,9 +65,7 @@ def test_without_a_stop_balance_is_left_out_unless_it_is_asked_for():
     drive = Measurements(
         Path("drive.csv"), 200, time=time, lengths=1.0 + rows, tensions=40.0 + rows
     )
-    asked, same = at_rest(task(), drive)
-    assert asked.rest is False
-    assert same.remarks == (
-        "the log is of a motion that never rests: balance of forces is not used",
-    )
-    assert at_rest(task(rest=True), drive)[1].count == 200
+    moving = at_rest(task(drive))
+    assert moving.rest is False
+    assert "never rests: balance of forces is not used" in moving.log.remarks[-1]
+    assert at_rest(task(drive, rest=True)).log.count == 200
