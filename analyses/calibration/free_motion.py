@@ -12,6 +12,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -244,10 +245,11 @@ def fit_free_motion(
     moved = [first_state(model, begun, s) for s in fitted]
     sensor = np.array([one.group in ("", "sensor") for one in model.unknowns])
     for n, (horizon, most) in enumerate(HORIZONS):
-        say(f"{'first ' + str(horizon) + ' s' if horizon < 1e3 else 'whole'} of each stretch")
+        stage = f"{'first ' + str(horizon) + ' s' if horizon < 1e3 else 'whole'} of each stretch"
+        say(stage)
         free = sensor if n == 0 else np.ones(len(z), bool)
         parts = [s.first(horizon) for s in fitted]
-        search = _Search(model, task.sigmas, parts, free)
+        search = _Search(model, task.sigmas, parts, free, partial(say, stage))
         z, moved, found = search.solve(z, moved, most)
         steps += int(found.nfev)
     if not np.isfinite(found.cost) or found.cost > 0.1 * LOST**2 * len(found.fun):
@@ -345,6 +347,8 @@ class _Search:
     sigmas: FreeSigmas
     stretches: Sequence[Stretch]
     free: np.typing.NDArray[np.bool_]
+    step: Callable[[], object] = lambda: None
+    """Called before each step; may raise to stop the search."""
 
     def vector(self, z: Array) -> Array:
         """Unknowns from sizes."""
@@ -395,6 +399,7 @@ class _Search:
             return np.concatenate([self.part(z, y, at, s) for y, at, s in each] + [x[: len(f)]])
 
         def jacobian(x: Array) -> Array:
+            self.step()
             z, states = parts(x)
             rows, (down, up) = [], steps_within(x, least, largest)
             each = zip(states, starts, self.stretches, strict=True)

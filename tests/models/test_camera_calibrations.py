@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from pydrake.common.yaml import yaml_dump_typed
 
+from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
@@ -93,6 +94,16 @@ def test_a_robot_and_a_scenario_take_it_and_what_is_not_used_is_said(tmp_path):
     robot.cameras[0].model = "mine.xml"
     robot_file = written(tmp_path / "robot.yaml", yaml_dump_typed(robot))
     assert load_robot(str(robot_file)).cameras[0].model == str(path)
+
+
+def test_a_run_keeps_it_beside_its_scenario(tmp_path):
+    path, folder = opencv(tmp_path / "mine.xml"), tmp_path / "run"
+    folder.mkdir()
+    scenario = load_scenario("acrobot_pbvs", [f"camera.model={path}"])
+    write_run_inputs(folder, scenario, load_robot(scenario.robot))
+    path.unlink()
+    again = load_scenario(str(folder / "scenario.yaml"))
+    assert again.camera.model == str(folder / "model.xml")
 
 
 WIDE = ROS.replace("plumb_bob", "equidistant").replace("520.", "160.").replace("518.", "160.")

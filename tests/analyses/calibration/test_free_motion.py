@@ -13,8 +13,9 @@ from cdpr_drake.analyses.calibration.free_motion_model import FREE_GROUPS, FreeM
 from cdpr_drake.analyses.calibration.free_motion_sensor import earlier
 from cdpr_drake.analyses.calibration.free_motion_start import StartCoordinates
 from cdpr_drake.analyses.fits.swings import dominant_frequency, identify_swings
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.cli.app import main
-from cdpr_drake.errors import IdentificationError
+from cdpr_drake.errors import IdentificationError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from tests.analyses.calibration import swings
 from tests.messages import printed
@@ -210,6 +211,15 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
     assert ended.value.code == 2
     assert words in said
     assert not out.exists()
+
+
+def test_a_search_stops_between_two_steps(tmp_path):
+    swings.write(tmp_path / "log.csv", (0,))
+    done, asked = [], iter([False] * 3)
+    follow = Follow(lambda now: done.append(now.what), stop=lambda: next(asked, True))
+    with pytest.raises(StoppedError):
+        identify_swings("irma4u", tmp_path / "log.csv", stretches=[(0.0, 1.0)], follow=follow)
+    assert done[1:] == 2 * ["first 0.6 s of each stretch"]
 
 
 def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
