@@ -168,7 +168,7 @@ def calibrate(
 
     Args:
         robot: Robot by name or file, as it is believed.
-        log: Log, text with columns.
+        log: Log, text with columns, or any other that cdpr import-log reads.
         unknown: Groups and names of parameters; default: exit_points,anchor_points, of a point
             mass exit_points, of a robot with fewer cables than degrees of freedom and no tracker
             the zeros of its sensors.
