@@ -99,7 +99,7 @@ def _read(path: Path) -> tuple[str, list[str], Log | None]:
         notes = [*assumed, *imported.completed.remarks, *point_notes(imported.robot)]
         return f"robot, {imported.tool}", notes, None
     if _is_scenario(path):
-        load_scenario(str(path))
+        load_scenario(path)
         return "scenario", [], None
     if names_mechanism(path):
         return "mechanism", _mechanism_notes(path), None

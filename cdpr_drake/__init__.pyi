@@ -12,7 +12,6 @@ from .analyses.fits.identification import identify as identify
 from .analyses.fits.identify_campaign import identify_campaign as identify_campaign
 from .analyses.fits.swings import identify_swings as identify_swings
 from .analyses.frame.follow import Follow as Follow
-from .analyses.front.scenarios import load_scenario as load_scenario
 from .analyses.kinematics import plot as plot
 from .analyses.kinematics import solve_forward_kinematics as solve_forward_kinematics
 from .analyses.kinematics import solve_inverse_kinematics as solve_inverse_kinematics
@@ -24,6 +23,7 @@ from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_mot
 from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
+from .analyses.runs.scenarios import load_scenario as load_scenario
 from .analyses.runs.seeds import repeat_run as repeat_run
 from .analyses.runs.seeds import run_many as run_many
 from .analyses.runs.serve import serve as serve

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, group_names, kept_fit, notes_table
 from cdpr_drake.analyses.fits.prediction import (
     EACH,
     NEXT_POSES,
@@ -168,7 +168,7 @@ def calibrate(
 
     Args:
         robot: Robot by name or file, as it is believed.
-        log: Log, text with columns.
+        log: Log, text with columns, or any other that cdpr import-log reads.
         unknown: Groups and names of parameters; default: exit_points,anchor_points, of a point
             mass exit_points, of a robot with fewer cables than degrees of freedom and no tracker
             the zeros of its sensors.
@@ -209,7 +209,7 @@ def calibrate(
         log = read_measurements(log, [cable.name for cable in loaded.cables])
     if tracker_late is not None:
         log = log.shifted(tracker_late)
-    names = default_unknown(loaded, log) if unknown is None else _names(unknown)
+    names = default_unknown(loaded, log) if unknown is None else group_names(unknown)
     sigmas = dict(sigmas or {})
     for name in sigmas:
         if name not in vars(HOMING):
@@ -251,10 +251,6 @@ _SIGMAS = ", ".join(
 calibrate.__doc__ = (
     (calibrate.__doc__ or "").replace("GROUPS", ", ".join(GROUPS)).replace("SIGMAS", _SIGMAS)
 )
-
-
-def _names(unknown: str | Sequence[str]) -> tuple[str, ...]:
-    return (unknown,) if isinstance(unknown, str) else tuple(unknown)
 
 
 def _pose(robot: Robot, word: Any) -> Any:

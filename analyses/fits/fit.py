@@ -224,6 +224,11 @@ def kept_fit(
         return fit
 
 
+def group_names(groups: str | Sequence[str]) -> tuple[str, ...]:
+    """Names of groups as a tuple."""
+    return (groups,) if isinstance(groups, str) else tuple(groups)
+
+
 def notes_table(notes: Sequence[tuple[str, str]]) -> list[Table]:
     """A table of notes, each with a word for what it is; none without notes."""
     return [Table("To know", ("what", "which"), notes)] if notes else []

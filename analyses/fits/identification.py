@@ -17,7 +17,7 @@ from cdpr_drake.analyses.fits.dynamics import (
     fit_dynamics,
     identified_robot,
 )
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, notes_table
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -121,11 +121,6 @@ def identify(
         f"identify-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
         formats=formats, follow=follow,
     )  # fmt: skip
-
-
-def group_names(groups: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of groups as a tuple."""
-    return (groups,) if isinstance(groups, str) else tuple(groups)
 
 
 def _log(robot: Robot, log: Any, late: float | None) -> Measurements:

@@ -27,8 +27,8 @@ from cdpr_drake.analyses.fits.dynamics import (
     fit_dynamics,
     identified_robot,
 )
-from cdpr_drake.analyses.fits.fit import ROBOT, Fit, kept_fit
-from cdpr_drake.analyses.fits.identification import Groups, group_names, identification_fit
+from cdpr_drake.analyses.fits.fit import ROBOT, Fit, group_names, kept_fit
+from cdpr_drake.analyses.fits.identification import Groups, identification_fit
 from cdpr_drake.analyses.fits.poses import schema_pose
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table

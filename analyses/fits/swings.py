@@ -20,7 +20,7 @@ from cdpr_drake.analyses.calibration.free_motion import (
 )
 from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, notes_table
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -132,7 +132,7 @@ def identify_swings(
         measured = read_measurements(Path(log), [cable.name for cable in loaded.cables])
     task = FreeMotionTask(
         robot=loaded, stretches=tuple(stretches), held_out=tuple(hold_out), sigmas=deviations,
-        unknown=None if unknown is None else _groups(unknown),
+        unknown=None if unknown is None else group_names(unknown),
         start=None if start is None else as_pose(loaded, start), tracker=tracker_frame, lead=lead,
         priors=dict(priors or {}),
     )  # fmt: skip
@@ -151,10 +151,6 @@ def identify_swings(
         f"identify-swings-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
         formats=formats, follow=follow,
     )  # fmt: skip
-
-
-def _groups(unknown: str | Sequence[str]) -> tuple[str, ...]:
-    return (unknown,) if isinstance(unknown, str) else tuple(unknown)
 
 
 def _sigmas(values: Mapping[str, float]) -> FreeSigmas:

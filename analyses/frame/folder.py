@@ -238,8 +238,13 @@ class Folder:
                 _remove(self.path / name)
         self._files = []
 
-    def complete(self) -> None:
-        """Marks the results as complete, and writes hashes of the files of users that were read."""
+    def complete(self, **more: Any) -> None:
+        """Marks the results as complete, and writes hashes of the files of users that were read.
+
+        Args:
+            more: Arguments that make them other results than the same command gives.
+        """
+        self._arguments |= more
         files = inputs_held()
         hashes = {} if files is None else files.hashes(self.path)
         if hashes:

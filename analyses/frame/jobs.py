@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Self, TypeVar
 
@@ -156,6 +156,7 @@ class _Process:
         self.connection, theirs = context.Pipe()
         self.jobs, self._number = 0, -1
         self._process = context.Process(target=_serve, args=(theirs, work))
+        resource_tracker.ensure_running()  # its start would let the signals through again
         held = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
         try:
             with started_with_one_thread():

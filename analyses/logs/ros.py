@@ -18,7 +18,12 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.logs.assembly import WORDS, Cells, assemble
-from cdpr_drake.analyses.logs.columns import SECONDS, read_header
+from cdpr_drake.analyses.logs.columns import (
+    CABLE_QUANTITIES,
+    MOST_CABLES,
+    SECONDS,
+    read_header,
+)
 from cdpr_drake.analyses.logs.log import Facts, Log
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, install_words
@@ -102,8 +107,9 @@ def read_bag(path: Path, _: str, facts: Facts) -> Log:
     }
 
     def weight(name: str) -> tuple[bool, int]:
-        columns = [read_header(header, ["C1"], 0) for header in headers[name].values()]
-        cables = any(column is not None and column.name.startswith("C1_") for column in columns)
+        names = [f"A{k}" for k in range(MOST_CABLES)]
+        columns = [read_header(header, names, 0) for header in headers[name].values()]
+        cables = any(column is not None and column.kind in CABLE_QUANTITIES for column in columns)
         return cables, len(chosen[name].rows)
 
     first = max(chosen, key=weight)

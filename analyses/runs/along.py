@@ -119,7 +119,7 @@ def assess_run(
         raise CdprError(f"threshold: found {threshold:g}; accepted: >= 0 [N]")
     path = Path(along)
     log = _log_of(path)
-    scenario = load_scenario(str(path / "scenario.yaml"), ())
+    scenario = load_scenario(path / "scenario.yaml")
     if not isinstance(scenario, Scenario):
         raise OutputFolderError(
             f"{path}: found a run of kind {scenario.kind}; accepted: one of a visual servo"

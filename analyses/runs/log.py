@@ -110,6 +110,30 @@ class DiskLog(Mapping[str, Array]):
         return len(self._sizes)
 
 
+class StoredLog(Mapping[str, Array]):
+    """The log of a file `log.npz`; each look at a quantity opens the file and reads it."""
+
+    def __init__(self, path: Path) -> None:
+        """Reads the names; raises OSError, ValueError or BadZipFile if that is no such file."""
+        self._path = path
+        with np.load(path, allow_pickle=False) as stored:
+            self._names = tuple(stored.files)
+
+    def __getitem__(self, name: str) -> Array:
+        """All rows of a quantity."""
+        if name not in self._names:
+            raise KeyError(name)
+        with np.load(self._path, allow_pickle=False) as stored:
+            values: Array = stored[name]
+        return values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+
 def log_block(log: Log, name: str, start: int, stop: int) -> Array:
     """Rows of a quantity from `start` to before `stop`, without reading the others."""
     return log.block(name, start, stop) if isinstance(log, DiskLog) else log[name][start:stop]

@@ -28,8 +28,9 @@ from cdpr_drake.analyses.frame.words import (
     whole,
 )
 from cdpr_drake.analyses.runs.breaks import REACTIONS, after_break
+from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import Camera, scenario_with
+from cdpr_drake.analyses.runs.simulate import Camera
 from cdpr_drake.errors import ScenarioError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json
@@ -177,7 +178,8 @@ def compare_reactions(
     }  # fmt: skip
     arguments = {name: run.arguments() for name, run in runs.items()}
     kept = f"runs/{base.name}-reactions"
-    with results_folder(kept, arguments, folder, overwrite, follow.results) as results:
+    again = folder is not None
+    with results_folder(kept, arguments, folder, overwrite, follow.results, again) as results:
         rows: dict[str, dict[str, Any]] = {}
         if results is not None and (results.path / RESULTS).is_file():
             rows = load_json((results.path / RESULTS).read_text(encoding="utf-8"))["reactions"]

@@ -9,6 +9,7 @@ import hashlib
 import shlex
 import shutil
 import time
+import zipfile
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ from cdpr_drake.analyses.runs.log import (
     DiskLog,
     Log,
     Recorder,
+    StoredLog,
     column_names,
     log_block,
     write_log,
@@ -51,6 +53,7 @@ from cdpr_drake.errors import (
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.schema.input_files import input_bytes
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import plain_values
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
@@ -277,6 +280,24 @@ class Run(Result):
         self.message = "the program ended before the run did"
         return self
 
+    def read(self, folder: Path) -> bool:
+        """Takes log and summary of a run whose files are all written; False if it is none.
+
+        What only an engine knows, as the last image of a depth camera, stays None.
+        """
+        files = [folder / name for name in ("log.npz", "log.csv", "summary.json")]
+        if (folder / PARTS).exists() or not all(path.is_file() for path in files):
+            return False
+        try:
+            self.log = StoredLog(files[0])
+            self._summary = load_json(files[2].read_text(encoding="utf-8"))
+        except (OSError, ValueError, zipfile.BadZipFile):
+            return False
+        self.outcome = Outcome[self._summary["outcome"].upper()]
+        self.message, self.folder = self._summary["message"], folder
+        self.sim_time, self.wall_time = self._summary["sim_time_s"], self._summary["wall_time_s"]
+        return True
+
     def write(self, folder: Folder) -> None:
         """Writes log and summary.
 
@@ -290,6 +311,7 @@ class Run(Result):
     def draw(
         self, folder: Folder, formats: Sequence[str] = DEFAULT_FORMATS,
         exports: Mapping[str, Callable[[Path], object]] | None = None, follow: Follow = NOBODY,
+        only_missing: bool = False,
     ) -> None:  # fmt: skip
         """Writes figures, exports and replay, one of which spoils no other, see `failed`.
 
@@ -298,6 +320,7 @@ class Run(Result):
             formats: Formats of figures.
             exports: Further writers, by names of files.
             follow: Who follows; figures that are not begun when it stops are left out.
+            only_missing: True to leave files as they are.
         """
         writers = {**(exports or {}), **figure_writers(self.figures(), formats)}
         writers["replay.html"] = self.replay
@@ -307,14 +330,15 @@ class Run(Result):
             follow.progress(Progress(f"writing {name}", self.sim_time, duration, unit="s"))
             writers[name](path)
 
-        failed = folder.write_all({name: partial(write, name) for name in writers}, follow.stop)
+        names = [n for n in writers if not (only_missing and (folder.path / n).exists())]
+        failed = folder.write_all({name: partial(write, name) for name in names}, follow.stop)
         self.failed = {} if follow.stop() else failed
 
-    def settle(self, folder: Folder) -> None:
-        """Removes the log that grew: from now on `log` reads `log.npz`."""
-        self.log = np.load(folder.path / "log.npz", allow_pickle=False)
+    def settle(self, folder: Folder, **more: Any) -> None:
+        """Removes the log that grew: from now on `log` reads `log.npz`; `more` as of `complete`."""
+        self.log = StoredLog(folder.path / "log.npz")
         shutil.rmtree(folder.path / PARTS, ignore_errors=True)
-        folder.complete()
+        folder.complete(**more)
 
     def as_dict(self) -> dict[str, Any]:
         """The summary, as `summary.json` has it; numbers that are not finite are None."""

@@ -43,8 +43,9 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import Camera, say_remarks, scenario_with
+from cdpr_drake.analyses.runs.simulate import Camera, say_remarks
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.pose_accuracy import repeatability

@@ -155,7 +155,9 @@ def depth_figure(run: Any) -> Figure:
     first = np.atleast_1d(axes)[0]
     _draw_distances(first, run.log, "depth_row", np.array([0.0, width]))
     first.set(ylabel="u in the middle row [px]")
-    if image is not None:
+    if image is None:
+        first.set_title("the log does not have the last image", fontsize=11)
+    else:
         plane(axes[1], np.where(image > 0.0, image, np.nan), "depth [m]")
         axes[1].set(xlabel="u [px]", ylabel="v [px]")
         axes[1].set_title("last image", fontsize=11)

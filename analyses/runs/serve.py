@@ -22,7 +22,8 @@ from cdpr_drake.analyses.frame.words import (
     whole,
 )
 from cdpr_drake.analyses.runs.run import Run
-from cdpr_drake.analyses.runs.simulate import scenario_with, simulate
+from cdpr_drake.analyses.runs.scenarios import scenario_with
+from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.remote.messages import PROTOCOL, check_available

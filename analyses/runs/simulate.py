@@ -11,7 +11,13 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.frame.folder import Folder, free_folder, read_marker, results_folder
+from cdpr_drake.analyses.frame.folder import (
+    Folder,
+    free_folder,
+    read_marker,
+    results_folder,
+    shown_path,
+)
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -32,18 +38,16 @@ from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.analyses.runs.mechanism import MechanismRun
 from cdpr_drake.analyses.runs.pick_and_place import PickAndPlaceRun
 from cdpr_drake.analyses.runs.run import Run
+from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.servo_figures import FILM, write_film
 from cdpr_drake.analyses.runs.steering import steered
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.errors import OutputFolderError, ScenarioError
-from cdpr_drake.models.mechanism_schema import Mechanism
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import set_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.scenarios.files import MECHANISM, TENSION_CONTROL, scenario_kind
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
 _LOG = logging.getLogger(__name__)
@@ -74,7 +78,8 @@ def simulate(
     """Simulates a scenario and writes summary, log, figures and replay.
 
     The same command goes on with a run that was killed or interrupted, in its folder, gives the
-    same numbers as an uninterrupted run, and draws what is missing.
+    same numbers as an uninterrupted run, and draws what is missing. A complete run in a folder that
+    is named is read again, and not simulated.
 
     Args:
         scenario: Scenario by name, path of a YAML file, or folder of a run, to repeat it.
@@ -120,28 +125,39 @@ def simulate(
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
     if follow.connect is not None and folder is None and follow.results is not None:
         folder = free_folder(follow.results.parent / base, {})  # no such run goes on
-    with results_folder(base, arguments, folder, overwrite, follow.results) as results:
+    seen = meshcat or follow.acts or follow.connect is not None
+    again = folder is not None and not seen
+    with results_folder(base, arguments, folder, overwrite, follow.results, again) as results:
         say_remarks(note, warnings, follow)
         if results is None:
             return run.simulate(None, follow)
-        _write_inputs(run, results)
-        with results.writing():
-            parts = results.claim(PARTS)
-            try:
-                run.simulate(results.path, follow)
-            except BaseException:
-                if not parts.exists():  # nothing was simulated
-                    results.discard()
-                raise
-        if follow.acts:  # what was done by hand stands in the scenario now
-            _write_inputs(run, results)
-        run.write(results)
+        complete = run.read(results.path)
+        if complete:
+            follow.say(f"reused the run of {shown_path(results.path)}")
+        else:
+            _simulate_into(results, run, follow)
         if run.outcome != Outcome.INTERRUPTED:
-            run.draw(results, formats, _exports(run, results, exports, video), follow)
+            run.draw(results, formats, _exports(run, results, exports, video), follow, complete)
             run.stopped = follow.stop()
         if not run.stopped and not run.failed:
             run.settle(results)
     return run
+
+
+def _simulate_into(results: Folder, run: Run, follow: Follow) -> None:
+    """Simulates a run, from a checkpoint if there is one, and writes inputs, log and summary."""
+    _write_inputs(run, results)
+    with results.writing():
+        parts = results.claim(PARTS)
+        try:
+            run.simulate(results.path, follow)
+        except BaseException:
+            if not parts.exists():  # nothing was simulated
+                results.discard()
+            raise
+    if follow.acts:  # what was done by hand stands in the scenario now
+        _write_inputs(run, results)
+    run.write(results)
 
 
 @verb()
@@ -166,7 +182,7 @@ def finish_run(
     marker = read_marker(path)
     if marker is None or marker["complete"] or not (path / PARTS).is_dir():
         raise OutputFolderError(f"{folder}: found no log of an interrupted run; accepted: one")
-    scenario = load_scenario(str(path / "scenario.yaml"))
+    scenario = load_scenario(path / "scenario.yaml")
     run = KINDS[scenario.kind](scenario)
     _check_options(run, video)
     with Folder(path, marker["arguments"]) as results:
@@ -174,7 +190,7 @@ def finish_run(
         run.draw(results, formats, _exports(run, results, exports, video), follow)
         run.stopped = follow.stop()
         if not run.stopped:
-            run.settle(results)
+            run.settle(results, interrupted_at_s=run.sim_time)
     return run
 
 
@@ -185,32 +201,6 @@ def say_remarks(note: str, warnings: Sequence[str], follow: Follow) -> None:
             _LOG.warning("%s", warning)
     for line in [*filter(None, [note]), *(f"warning: {warning}" for warning in warnings)]:
         follow.say(line)
-
-
-def scenario_with(
-    scenario: Any, overrides: Sequence[str] = (), *, camera: str | None = None,
-    duration: float | None = None, seed: int | None = None, log_rate: float | None = None,
-) -> Any:  # fmt: skip
-    """A scenario by name, file or folder, with the settings that have arguments of their own.
-
-    Raises:
-        ScenarioError: It is unknown, malformed, a robot, or loaded already and there are settings.
-    """
-    settings = {"camera.kind": camera, "duration": duration, "seed": seed, "log_rate": log_rate}
-    items = [f"{key}={value}" for key, value in settings.items() if value is not None]
-    if isinstance(scenario, Robot | Mechanism):
-        raise ScenarioError(
-            f"scenario: found the robot {scenario.name}; accepted: a scenario, which names a "
-            "robot; solve_tensions, compute_workspace, assess_stability and view take robots"
-        )
-    if not isinstance(scenario, str | Path):
-        if items or overrides:
-            raise ScenarioError("scenario: found a loaded one with overrides; accepted: its name")
-        return scenario
-    name = str(scenario)
-    if camera is not None and scenario_kind(name) in (TENSION_CONTROL, MECHANISM):
-        raise ScenarioError(f"camera: found with {name}, which has no camera; accepted: without")
-    return load_scenario(name, [*overrides, *items])
 
 
 def _check_options(

@@ -407,7 +407,7 @@
           }
           pen.fillStyle = words;
           const says = lane < 12 ? (number ? "" : "slack") : data.names[k] + " slack";
-          pen.fillText(says, box.left - 4, high + lane / 2 - 1, 42);
+          pen.fillText(says, box.left - 4, high + lane / 2 - 1, box.left - 6);
         });
         pen.strokeStyle = words;
         pen.lineWidth = 1;

@@ -179,7 +179,7 @@ def visual_servo(scenario: Any, purpose: str, overrides: Sequence[str] = ()) -> 
     from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
     named = isinstance(scenario, str | Path)
-    loaded = load_scenario(str(scenario), overrides) if named else scenario
+    loaded = load_scenario(scenario, overrides) if named else scenario
     if not isinstance(loaded, Scenario):
         raise ScenarioError(
             f"scenario {loaded.name}: found kind {loaded.kind}; accepted for {purpose}: a visual "

@@ -141,7 +141,9 @@ class LeastSquares:
 
     def evaluate(self, at: Point) -> tuple[Array, Array, Array]:
         """All residuals, shape (k, rows), and derivatives in typical sizes."""
-        parts = [list(term.evaluate(at, self.free)) for term in self.terms]
+        parts = [list(term.evaluate(at)) for term in self.terms]
+        for part in parts:
+            part[1] = part[1][:, :, self.free]
         for part, gone in zip(parts, self.dropped or (), strict=False):
             part[0] = np.where(gone, 0.0, part[0])
             part[1] = np.where(gone[:, :, None], 0.0, part[1])

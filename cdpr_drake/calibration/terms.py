@@ -61,18 +61,13 @@ class Term(ABC):
         """Residuals in the unit, shape (k, rows), and their derivatives by what is unknown of each
         pose, shape (k, rows, width), and by parameters."""
 
-    def evaluate(self, at: Point, free: npt.NDArray[np.bool_] | None = None) -> Evaluated:
+    def evaluate(self, at: Point) -> Evaluated:
         """Residuals over their sigmas, shape (k, rows), zero where nothing was measured, and their
-        derivatives by the free parameters, (k, rows, f), or all, and by each pose, (k, rows,
-        width)."""
+        derivatives by all parameters, (k, rows, n), and by each pose, (k, rows, width)."""
         residual, B, slopes = self.parts(at)
-        free = np.ones(at.layout.size, bool) if free is None else free
-        count = int(np.sum(free))
-        places = np.where(free, np.cumsum(free) - 1, count)  # those of the others are cut off
-        A = np.zeros((*residual.shape, count + 1))
+        A = np.zeros((*residual.shape, at.layout.size))
         for rows, columns, values in slopes:
-            A[:, rows, places[columns]] = values
-        A = A[:, :, :count]
+            A[:, rows, columns] = values
         weight = self.weights()
         return self._weighted(residual, weight), A * weight[:, :, None], B * weight[:, :, None]
 
@@ -413,9 +408,9 @@ class EquilibriumTerm(Term):
     def _weighted(self, residual: Array, weight: Array) -> Array:
         return residual * weight
 
-    def evaluate(self, at: Point, free: npt.NDArray[np.bool_] | None = None) -> Evaluated:
+    def evaluate(self, at: Point) -> Evaluated:
         """As the base class says; moments and forces have one sigma each, which bases keep."""
-        r, A, B = super().evaluate(at, free)
+        r, A, B = super().evaluate(at)
         if self.motion is None:
             return r, A, B
         bases = self._bases(at)

@@ -10,6 +10,7 @@ import json as js
 import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, nullcontext
+from functools import wraps
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Annotated, Any, NamedTuple, get_args
@@ -60,13 +61,37 @@ def make_app(command_line: Sequence[str]) -> App:
         default_parameter=_usual_parameter(),
     )  # fmt: skip
     for name, command in COMMANDS.items():
-        words = {} if name == command_name else {"help": command.line}
+        verb: Any = _verb_of(command, command_line)
+        words = {"help": command.line}
+        if name == command_name:
+            verb, words = _with_options(resolve_name(verb)), {}
         examples = "\n\n".join(("Examples:", *(f"`{line}`" for line in command.examples)))
         for option, (_, line) in command.forms.items():
             examples += f"\n\n`cdpr {name} --{option} --help`: {line}"
-        app.command(_verb_of(command, command_line), name=name, help_epilogue=examples, **words)
+        app.command(verb, name=name, help_epilogue=examples, **words)
     app.register_install_completion_command(name=COMPLETION)
     return app
+
+
+def _signature(verb: Callable[..., Any]) -> inspect.Signature:
+    """That of a verb on a command line: what has a default is an option, but for the first."""
+    parameters = list(inspect.signature(verb, eval_str=True).parameters.values())
+    for place, parameter in enumerate(parameters):
+        either = parameter.kind is parameter.POSITIONAL_OR_KEYWORD
+        if place > 0 and either and parameter.default is not parameter.empty:
+            parameters[place] = parameter.replace(kind=parameter.KEYWORD_ONLY)
+    return inspect.Signature(parameters)
+
+
+def _with_options(verb: Callable[..., Any]) -> Callable[..., Any]:
+    """A verb with its signature on a command line."""
+
+    @wraps(verb)
+    def with_options(*arguments: Any, **options: Any) -> Any:
+        return verb(*arguments, **options)
+
+    with_options.__signature__ = _signature(verb)  # type: ignore[attr-defined]
+    return with_options
 
 
 def _verb_of(command: Command, command_line: Sequence[str]) -> str:
@@ -252,17 +277,12 @@ def _show(result: Any, call: Call) -> int:
 
 def options_of(verb: Callable[..., Any]) -> dict[str, str]:
     """Options of a verb by the names of its arguments, without its subject and other words."""
-    found = {}
-    parameters = inspect.signature(verb, eval_str=True).parameters
-    for place, (argument, parameter) in enumerate(parameters.items()):
-        optional = parameter.default is not parameter.empty and place > 0
-        if parameter.kind is parameter.POSITIONAL_ONLY or (
-            parameter.kind is not parameter.KEYWORD_ONLY and not optional
-        ):
-            continue
-        names = _own_names(parameter)
-        found[argument] = names[0] if names else f"--{argument.replace('_', '-')}"
-    return found
+    names = {}
+    for argument, parameter in _signature(verb).parameters.items():
+        if parameter.kind is parameter.KEYWORD_ONLY:
+            named = _own_names(parameter)
+            names[argument] = named[0] if named else f"--{argument.replace('_', '-')}"
+    return names
 
 
 def _own_names(parameter: inspect.Parameter) -> list[str]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import Any, get_args
 
 from cdpr_drake.cli.call import shown_arguments
@@ -31,16 +29,12 @@ def command_forms() -> dict[str, CommandForm]:
 
 
 def _form(name: str) -> CommandForm:
-    parameters = inspect.signature(resolve_name(COMMANDS[name].verb)).parameters
     options = []
     for argument in shown_arguments(name):
-        parameter, option = parameters[argument.field_info.name], argument.name
-        positional = parameter.kind is parameter.POSITIONAL_ONLY or (
-            parameter.kind is not parameter.KEYWORD_ONLY and parameter.default is parameter.empty
-        )
-        if positional or option.removeprefix("--") in LEFT_OUT:
+        about, option = argument.field_info, argument.name
+        if not about.is_keyword_only or option.removeprefix("--") in LEFT_OUT:
             continue
-        usual = parameter.default
+        usual = about.default
         if isinstance(usual, tuple | list):
             usual = ",".join(map(str, usual))
         options.append(CommandOption(
@@ -48,7 +42,7 @@ def _form(name: str) -> CommandForm:
             words=" ".join(str(argument.parameter.help or "").split()),
             kind=_kind(argument.hint, argument.parameter.metavar),
             many=getattr(argument.parameter.converter, "many", False),
-            usual="" if usual in (None, parameter.empty) or isinstance(usual, bool) else str(usual),
+            usual="" if usual in (None, about.empty) or isinstance(usual, bool) else str(usual),
         ))  # fmt: skip
     return CommandForm(name, COMMANDS[name].line, tuple(options))
 

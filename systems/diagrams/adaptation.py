@@ -10,7 +10,6 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.calibration.recursive import RecursiveCalibration
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
@@ -22,6 +21,7 @@ from cdpr_drake.systems.controllers.tension_management_settings import (
 from cdpr_drake.systems.diagrams.controller import make_tasks
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.estimators.geometry_learner import BELIEVED_POINTS, GeometryLearner
+from cdpr_drake.systems.estimators.recursive_calibration import RecursiveCalibration
 from cdpr_drake.systems.monitoring.belief_check import BeliefCheck
 from cdpr_drake.systems.monitoring.stability_watch import ServoCriterion
 from cdpr_drake.systems.robots.assembly import RobotBlock

@@ -235,16 +235,15 @@ as `kind`."""
 
 
 def load_scenario(
-    name: str, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
+    name: str | Path, overrides: Sequence[str] = (), *, schema: type[Any] | None = None
 ) -> Any:
-    """Reads a scenario by name or by path to a YAML file, and checks it against its robot
-    or mechanism.
+    """Reads a scenario, and checks it against its robot or mechanism.
 
     Args:
-        name: Name or path.
+        name: A name of `scenario_names()`, the path of a YAML file, or the folder of a run.
         overrides: Items "key.subkey=value" that replace what the file says.
-        schema: Dataclass to read it into, in the place of its kind's: a subclass that has more
-            sections.
+        schema: Class that it is read into: a subclass, with more sections, of its kind's; None:
+            its kind's.
 
     Returns:
         A `Scenario`, `TensionScenario`, `PickAndPlaceScenario` or `MechanismScenario`, as the
@@ -254,6 +253,7 @@ def load_scenario(
         ScenarioError: Unknown or malformed scenario, or its robot cannot do what it asks.
         RobotFileError: Its robot's file does not describe a possible robot.
     """
+    name = str(name)
     kind = scenario_kind(name)
     of_kind, check = SCENARIO_SCHEMAS[kind]
     if schema is not None and not issubclass(schema, of_kind):

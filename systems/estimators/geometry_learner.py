@@ -1,6 +1,6 @@
 """Scenario section `adaptation`, and its block: exit and anchor points learnt while servoing.
 
-`calibration.recursive` does the learning; a criterion is asked before the servo gets a model.
+`recursive_calibration` does the learning; a criterion is asked before the servo gets a model.
 
 Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
@@ -14,7 +14,8 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.recursive import (
+from cdpr_drake.schema.fields import number, switch, whole
+from cdpr_drake.systems.estimators.recursive_calibration import (
     CORNER_ROWS,
     Beforehand,
     LearningRules,
@@ -22,7 +23,6 @@ from cdpr_drake.calibration.recursive import (
     Look,
     RecursiveCalibration,
 )
-from cdpr_drake.schema.fields import number, switch, whole
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
 

@@ -8,7 +8,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot, robot_text
-from tests.analyses.front.front_checks import shows_itself
+from tests.analyses.verbs.verb_checks import shows_itself
 from tests.cli.commands import answer, told
 
 

@@ -15,7 +15,7 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import rotation_from_vector, rotation_vector
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
-from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+from tests.analyses.verbs.verb_checks import as_json, one_line, shows_itself
 from tests.models.mechanisms.test_refusals import ASKED, TAKES
 
 POSE = [0.1, 0.05, 0.5, 2.0, -3.0, 5.0]

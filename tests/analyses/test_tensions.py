@@ -12,7 +12,7 @@ from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.models.robot_statics import tension_problem, wrench_balance
 from cdpr_drake.tensions import methods
 from cdpr_drake.tensions.methods import METHODS, distribute
-from tests.analyses.front.front_checks import one_line, shows_itself
+from tests.analyses.verbs.verb_checks import one_line, shows_itself
 from tests.cli.commands import answer, told
 from tests.figure_faults import figure_faults
 

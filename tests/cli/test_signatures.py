@@ -22,6 +22,11 @@ def is_option(argument):
     return argument.name.startswith("--")
 
 
+def is_either(parameter):
+    """True if it is written with dashes or in its place."""
+    return not parameter.is_positional_only and not parameter.is_keyword_only
+
+
 def kinds(argument):
     """Types of an argument without None."""
     parts = getattr(argument.hint, "__args__", (argument.hint,))
@@ -80,6 +85,12 @@ def test_first_line_and_arguments_have_words_and_a_verb_names_no_option(name):
     if COMMANDS[name].verb.startswith("cdpr_drake.analyses"):
         code = inspect.getsource(verb).rpartition('"""')[2]
         assert [option for option in options_of(verb).values() if f'"{option}"' in code] == []
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_what_has_a_default_is_an_option_but_for_the_first(name):
+    either = [argument for argument in ARGUMENTS[name] if is_either(argument.field_info)]
+    assert [argument.name for argument in either[1:] if not argument.required] == []
 
 
 VERBS = [

@@ -245,13 +245,12 @@ function frame(pen, box, times, values, colors, title) {
     pen.fillText(words, box.left - 5, y + 4);
   }
   pen.textAlign = "center";
-  for (const [value, words] of ticks(times, 6)) {
+  const instants = ticks(times, 6);
+  for (const [k, [value, words]] of instants.entries()) {
     const x = place(value, times, box.left, box.right);
     line(pen, x, box.bottom, x, box.bottom + 4);
-    pen.fillText(words, x, box.bottom + 16);
+    pen.fillText(k === instants.length - 1 ? `${words} s` : words, x, box.bottom + 16);
   }
-  pen.textAlign = "right";
-  pen.fillText("s", box.right + 12, box.bottom + 16);
   pen.strokeStyle = colors.soft;
   pen.strokeRect(box.left, box.top, box.right - box.left, box.bottom - box.top);
 }

@@ -9,7 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from cdpr_drake.analyses.runs.steering import MarksPicture, shown_limits
+from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
@@ -56,7 +56,7 @@ class FinishedRun:
                 f"{folder.name}: holds no results of a run; accepted: a folder of cdpr simulate"
             )
         check_moves_robot(str(folder / SCENARIO), "the studio")
-        self.scenario = load_scenario(str(folder / SCENARIO))
+        self.scenario = load_scenario(folder / SCENARIO)
         robot = load_robot(self.scenario.robot)
         self.cables = [cable.name for cable in robot.cables]
         self.limits = shown_limits(self.scenario, robot)

@@ -43,7 +43,7 @@ class RunEntry:
         """
         file = self.folder / "scenario.yaml"
         if file.is_file():
-            return load_scenario(str(file))
+            return load_scenario(file)
         return None if self.job is None else load_scenario(self.job.scenario, self.job.settings)
 
 

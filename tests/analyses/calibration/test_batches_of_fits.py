@@ -5,7 +5,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.models.robot_draws import ParameterCovariance
-from tests.analyses.front.test_front_fits import tracked_poses
+from tests.analyses.verbs.test_fits import tracked_poses
 from tests.identification.logs import log as motion_log
 
 COUNT = 300

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -133,3 +135,19 @@ def test_long_work_starts_processes_by_itself(monkeypatch):
     monkeypatch.setattr(module, "default_workers", lambda: 2)
     finished = list(finished_jobs(slow, range(6)))
     assert sorted(one.result for one in finished) == list(range(6))
+
+
+STARTED = """
+from cdpr_drake.analyses.frame.jobs import _Process
+process = _Process(abs)
+print(open(f"/proc/{process._process.pid}/status").read())
+process.end(at_once=True)
+"""
+
+
+def test_ctrl_c_does_not_end_the_first_process_while_it_starts():
+    """Python's resource tracker, which starts before it, lets signals through."""
+    status = subprocess.run([sys.executable, "-c", STARTED], capture_output=True, text=True).stdout
+    blocked = int(status.split("SigBlk:")[1].split()[0], 16)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        assert blocked & 1 << (number - 1)

@@ -1,10 +1,5 @@
-"""A folder of its own for commands."""
+"""Fixtures of commands."""
 
-import pytest
+from tests.cli.conftest import here, without_pictures
 
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A folder of its own, where the command is called."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+__all__ = ["here", "without_pictures"]

@@ -8,8 +8,6 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
-ENDING = ("outcome", "message", "sim_time", "wall_time")
-
 TIMES = np.array([0.0, 0.5, 1.5, 3.5])
 """Of the rows; no two are equally far apart [s]."""
 
@@ -34,11 +32,18 @@ def platform_poses():
     return [RigidTransform(RollPitchYaw(a), p) for a, p in zip(angles, places, strict=True)]
 
 
-def off(X_WP, distance, angle):
-    """A pose that far away and turned that much about its x axis."""
-    turn = RigidTransform(RollPitchYaw(angle, 0.0, 0.0), [0.0, 0.0, 0.0])
-    return RigidTransform(X_WP.translation() + np.array([0.0, distance, 0.0])) @ (
-        RigidTransform(X_WP.rotation(), [0.0, 0.0, 0.0]) @ turn
+def rows(poses):
+    return np.array([pose_row(X) for X in poses])
+
+
+def poses_off(distances, angles):
+    """Rows of poses that are so far from the platform's along y, and turned about their x axes."""
+    return rows(
+        RigidTransform(
+            X.rotation() @ RollPitchYaw(angle, 0.0, 0.0).ToRotationMatrix(),
+            X.translation() + np.array([0.0, distance, 0.0]),
+        )
+        for X, distance, angle in zip(platform_poses(), distances, angles, strict=True)
     )
 
 
@@ -47,54 +52,42 @@ def run_by_hand(name="acrobot_pbvs", *settings):
     run = ServoRun(load_scenario(name, ["camera.kind=projected", *settings]))
     servo = run.built
     m, pinhole = len(servo.robot.cables), servo.pinhole
-    poses = platform_poses()
-    depth = np.array([0.5, 0.4, 0.3, 0.2])
-    ahead = [
-        [(u - pinhole.cx) / pinhole.fx * z, (v - pinhole.cy) / pinhole.fy * z, z]
-        for (u, v), z in zip(SEEN, depth, strict=True)
+    X_CO = [
+        RigidTransform(
+            RollPitchYaw(np.pi, 0.0, 0.0),
+            [(u - pinhole.cx) / pinhole.fx * z, (v - pinhole.cy) / pinhole.fy * z, z],
+        )
+        for (u, v), z in zip(SEEN, (0.5, 0.4, 0.3, 0.2), strict=True)
     ]
-    X_CO = [RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), p) for p in ahead]
-    points = [pinhole.project(X @ servo.target.points).T.ravel() for X in X_CO]
     rng = np.random.default_rng(1)
     tensions = rng.uniform(2.0, 50.0, (4, m))
     tensions[1, 2], tensions[2, 5] = 0.0, 57.5
     slack = np.zeros((4, m))
     slack[0, 1] = slack[1, 2] = slack[1, 3] = slack[3, 4] = 1.0
-    log = {
+    run.log = {
         "time": TIMES,
         "found": FOUND[:, None].astype(float),
         "gain": np.array([[0.5], [0.0], [0.4], [0.3]]),
         "error": rng.uniform(-1.0, 1.0, (4, 6)),
-        "corners_px": np.array(points),
-        "X_CO_measured": np.array([pose_row(X) for X in X_CO]),
-        "X_WP": np.array([pose_row(X) for X in poses]),
-        "X_WP_estimated": np.array(
-            [
-                pose_row(off(*each))
-                for each in zip(poses, ESTIMATE_OFF, ESTIMATE_TURNED, strict=True)
-            ]
-        ),
+        "corners_px": np.array([pinhole.project(X @ servo.target.points).T.ravel() for X in X_CO]),
+        "X_CO_measured": rows(X_CO),
+        "X_WP": rows(platform_poses()),
+        "X_WP_estimated": poses_off(ESTIMATE_OFF, ESTIMATE_TURNED),
         "tensions": tensions,
         "slack": slack,
         "surplus_lengths": 0.01 * slack,
         "cable_velocities": rng.uniform(-0.1, 0.1, (4, m)),
     }
-    return changed(
-        run, log=log, outcome=Outcome.TIMEOUT, message="slow", sim_time=3.5, wall_time=0.5
-    )
+    run.outcome, run.message = Outcome.TIMEOUT, "slow"
+    run.sim_time, run.wall_time = 3.5, 0.5
+    return run
 
 
-def changed(run, **attributes):
-    """A run of the same scenario with other attributes, and nothing that was computed of it."""
-    same = {name: getattr(run, name) for name in (*ENDING, "built", "log", "broken")}
+def changed(run, log=None, **attributes):
+    """The run with other quantities and attributes, and nothing that was computed of it."""
     other = ServoRun(run.scenario)
-    for name, value in {**same, **attributes}.items():
+    names = ("built", "broken", "outcome", "message", "sim_time", "wall_time")
+    same = {name: getattr(run, name) for name in names}
+    for name, value in {**same, **attributes, "log": {**run.log, **(log or {})}}.items():
         setattr(other, name, value)
     return other
-
-
-def with_plan(result):
-    """The same with a plan."""
-    poses = zip(platform_poses(), PLAN_OFF, PLAN_TURNED, strict=True)
-    planned = np.array([pose_row(off(*each)) for each in poses])
-    return changed(result, log=result.log | {"X_WP_planned": planned})

@@ -1,28 +1,33 @@
-"""What is said before a servo starts: a target out of view, a goal that is not possible."""
+"""What is said before a run starts, of limits that replace the robot's, and of unexpected ends."""
 
 import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from cdpr_drake.analyses.frame.follow import Follow
+from cdpr_drake.analyses.runs import KINDS
 from cdpr_drake.analyses.runs.checks import (
     check_start,
     goal_warnings,
+    limit_warnings,
+    servo_limit_warnings,
     sheave_warnings,
     step_warnings,
 )
-from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.runs.simulate import KINDS
-from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.cli.app import main
+from cdpr_drake.analyses.runs.unexpected_end import servo_message, slack_words, unexpected_end
 from cdpr_drake.errors import ScenarioError
+from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.materials import BehaviourSettings
+from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
-from tests.messages import printed
+from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd
+from tests.analyses.runs.run_by_hand import changed, run_by_hand
+from tests.cli.commands import refuse
 
 PROJECTED = "camera.kind=projected"
 
@@ -39,19 +44,19 @@ def test_scenarios_of_the_package_see_their_target_and_can_reach_their_goal(name
 
 
 @pytest.mark.parametrize(
-    ("pose", "expected"),
+    ("pose", "place"),
     [
         ("position=[-0.5, 0.5, 0.0]", "its middle would be at (2937, 3134) px, 0.0847 m away"),
         ("position=[0.2209, -0.197, 0.9]", "m behind the camera"),
         ("angles_deg=[180, 0, 0]", "it is turned away from the camera, or a part"),
     ],
 )
-def test_a_target_out_of_view_is_refused_with_where_it_would_be(pose, expected):
+def test_a_target_out_of_view_is_refused_with_where_it_would_be(pose, place):
     with pytest.raises(ScenarioError) as caught:
         check_start(servo(f"target.pose.{pose}"))
     message = str(caught.value)
     assert message.startswith("acrobot_pbvs: initial_pose: the camera does not see the target")
-    assert expected in message
+    assert place in message
     assert "accepted: all of it within 640 x 480 px, face on" in message
     assert "\n" not in message
 
@@ -87,63 +92,94 @@ def test_a_step_beyond_the_stable_one_is_warned_of_with_the_number():
     assert good.max_step < largest < 2.0 * good.max_step
 
 
+STEPS = "accepted: at most 1e+09 steps"
+
+
 @pytest.mark.parametrize(
-    "asked",
+    ("name", "setting", "words"),
     [
-        "acrobot_pbvs --camera projected --duration 1e12",
-        "acrobot_pbvs --camera projected --set integration.max_step=1e-12",
-        "planar_computed_torque --duration 1e12",
-        "planar_computed_torque --set integration.max_step=1e-12",
-        "planar_computed_torque --set controller.rate=1e9",
-        "acrobot_pbvs --set camera.rate=1e9",
-        "acrobot_pbvs --set camera.latency_frames=1000000000",
-        "acrobot_pbvs --set log_rate=1e300",
+        *((scenario_names(kind)[0], "integration.max_step=1e-12", STEPS) for kind in KINDS),
+        ("acrobot_pbvs", "duration=1e12", STEPS),
+        *(
+            (name, f"{key}=9e15", f"{key}: found 9e15; accepted: a number .* <= 100000")
+            for name in ("acrobot_pbvs", "planar_computed_torque")
+            for key in ("controller.rate", "log_rate")
+        ),
+        ("acrobot_pbvs", "camera.rate=9e15", "camera.rate: found 9e15"),
+        ("acrobot_pbvs", "camera.latency_frames=1000000000", "latency_frames: found 1000000000"),
     ],
 )
-def test_steps_rates_and_delays_beyond_sense_are_one_line(asked, capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", *asked.split()])
-    error = printed(capsys).err
-    assert ended.value.code == 2
-    assert "accepted: " in error
-    assert len(error.strip().splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_camera_of_a_frame_an_hour_is_not_waited_for_in_the_warm_up():
-    seen = []
-    run = ServoRun(servo("camera.rate=0.0003", "controller.rate=0.0003").scenario)
-    result = run.simulate(follow=Follow(seen.append, lambda: len(seen) >= 2))
-    assert result.outcome == Outcome.INTERRUPTED
-    assert result.sim_time == pytest.approx(0.2)
-
-
-@pytest.mark.parametrize("name", KINDS)
-def test_every_kind_refuses_runs_that_would_never_end(name):
+def test_runs_that_would_never_end_are_refused(name, setting, words):
     """Runs by tensions once began whatever their step was."""
-    scenario = load_scenario(scenario_names(name)[0], ["integration.max_step=1e-12"])
-    with pytest.raises(ScenarioError, match="accepted: at most"):
-        KINDS[name](scenario).check()
+    check = lambda scenario: KINDS[scenario.kind](scenario).check()  # noqa: E731
+    with pytest.raises(ScenarioError, match=words.replace("+", r"\+")) as refused:
+        check(load_scenario(name, [setting]))
+    assert "\n" not in str(refused.value)
+
+
+def test_the_command_refuses_in_one_line_and_writes_nothing(capsys, here):
+    for setting in ("integration.max_step=1e-12", "controller.rate=1e9"):
+        assert "accepted: " in refuse(capsys, "simulate", "planar_pbvs", "--set", setting)
+    assert list(here.iterdir()) == []
+
+
+# Limits, and ends that nobody expected.
+
+
+def test_limits_of_winches_by_torque_and_of_mechanisms_are_said():
+    scenario, robot = load_scenario("acrobot_torque_servo"), load_robot("acrobot_small")
+    (words,) = servo_limit_warnings(scenario, robot)
+    assert "torque_control.limits = 1 to 60 N replace tension_bounds of acrobot_small" in words
+    scenario.winches.mode = "velocity"  # which no limits hold
+    assert servo_limit_warnings(scenario, robot) == []
+    (words,) = limit_warnings("control.limits", np.array([0.0, 9.0]), load_mechanism("cable_arm"))
+    assert "control.limits = 0 to 9 N replace tension_bounds of cable_arm" in words
 
 
 @pytest.mark.parametrize(
-    ("name", "key"),
+    ("expected", "outcome", "errors", "words"),
     [
-        *(("acrobot_pbvs", key) for key in ("camera.rate", "controller.rate", "log_rate")),
-        *(("planar_computed_torque", key) for key in ("controller.rate", "log_rate")),
+        (None, Outcome.CONVERGED, (0.1, 0.1), ""),
+        (None, Outcome.COMPLETED, (0.1, 0.1), ""),
+        (None, Outcome.TIMEOUT, (0.0, 0.0), "ended by timeout"),
+        (None, Outcome.INTERRUPTED, (0.0, 0.0), ""),
+        (("timeout", None, None), Outcome.TIMEOUT, (0.1, 0.1), ""),
+        (("timeout", None, None), Outcome.CONVERGED, (0.0, 0.0), "expected timeout"),
+        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.002, 0.0), "2 mm, expected.position"),
+        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.0, 0.01), "0.573 deg, expected.rot"),
+        (("converged", 0.001, 0.1), Outcome.CONVERGED, (0.0005, 0.001), ""),
     ],
 )
-def test_rates_that_nothing_follows_are_refused(name, key):
-    """Such runs once stood still."""
-    load_scenario(name, [f"{key}=1e5"])
-    with pytest.raises(ScenarioError, match=f"overrides {key}: found 9e15; .* <= 100000"):
-        load_scenario(name, [f"{key}=9e15"])
+def test_what_is_expected_decides(expected, outcome, errors, words):
+    keys = ("outcome", "position", "rotation_deg")
+    end = None if expected is None else ExpectedEnd(**dict(zip(keys, expected, strict=True)))
+    scenario = replace(load_scenario("acrobot_pbvs"), expected=end)
+    said = " ".join(unexpected_end(scenario, outcome, errors))
+    assert words in said
+    assert bool(said) == bool(words)
 
 
-def test_slow_cameras_and_controllers_do_not_make_warming_up_longer_than_the_run():
-    """One image in a hundred years: such a run once began with them."""
-    scenario = load_scenario("acrobot_pbvs", [PROJECTED, "camera.rate=3e-10", "duration=0.05"])
-    assert ServoRun(scenario).simulate().sim_time == pytest.approx(0.05)
-    scenario = load_scenario("planar_computed_torque", ["controller.rate=3e-10", "duration=0.05"])
-    assert TensionRun(scenario).simulate().sim_time <= 0.05
+def test_slack_cables_are_named_the_longest_first():
+    slack = np.zeros((4, 8))
+    slack[0:1, 2], slack[0:3, 5] = 1.0, 1.0
+    log = {"time": np.array([0.0, 1.0, 3.0, 6.0]), "slack": slack}
+    robot = load_robot("acrobot_small")
+    assert slack_words(log, robot) == "cables were slack: C6 6.0 s, C3 1.0 s"
+    assert slack_words({**log, "slack": 0.0 * slack}, robot) == ""
+
+
+@pytest.mark.parametrize(
+    ("distances", "words"),
+    [
+        ([5e-3, 4e-3, 3e-3, 2e-3], "to change: duration (longer)"),  # it becomes smaller
+        ([2e-3] * 4, "to change: stop.position (larger), target.size (larger)"),
+        ([1e-5] * 4, "before both limits had held for stop.hold = 0.5 s; to change: duration"),
+    ],
+)  # fmt: skip
+def test_a_timeout_says_which_limits_were_missed_and_what_to_change(distances, words):
+    run = run_by_hand()
+    seen = np.tile(pose_row(run.built.X_CdO), (4, 1))
+    seen[:, 6] += distances
+    log = {"X_CO_measured": seen, "time": np.linspace(0.0, 1.0, 4)}
+    log |= {"found": np.ones((4, 1)), "slack": np.zeros((4, 8))}
+    assert words in servo_message(changed(run, log))

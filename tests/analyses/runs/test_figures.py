@@ -1,5 +1,6 @@
-"""Figures of runs: titles, units, legends, and that they draw what the log says."""
+"""Figures and numbers of subjects: titles, units, legends, and that they are what the log says."""
 
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
@@ -9,17 +10,32 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs import sections, servo_figures
-from cdpr_drake.analyses.runs.adaptation import LEARNT_POINTS
-from cdpr_drake.analyses.runs.sensing import SENSING, reading_figure
+from cdpr_drake.analyses.runs.adaptation import (
+    LEARNT_POINTS,
+    adaptation_numbers,
+    doubts,
+    true_offsets,
+)
+from cdpr_drake.analyses.runs.sensing import SENSING, pan_tilt_numbers, reading_figure
 from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.calibration.identifiability import FRAMES
+from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.pan_tilt import (
+    LOGGED_ENCODERS,
+    LOGGED_FOUND,
+    LOGGED_IMAGE,
+    LOGGED_JOINTS,
+)
 from cdpr_drake.systems.estimators.geometry_learner import (
     ADAPTATION,
     ADAPTATION_PARTS,
+    DOUBTED,
     LEARNT,
     LEARNT_SIGMA,
+    OPEN_FRAMES,
 )
 from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
 from cdpr_drake.systems.sensors.sensor_settings import (
@@ -31,6 +47,13 @@ from cdpr_drake.systems.sensors.sensor_settings import (
     SensorSuite,
 )
 from cdpr_drake.trajectories.pose_trajectory import SteadyMotion
+from tests.analyses.runs.run_by_hand import (
+    ESTIMATE_OFF,
+    ESTIMATE_TURNED,
+    FOUND,
+    SEEN,
+    run_by_hand,
+)
 from tests.figure_faults import figure_faults
 
 SHORT = ("camera.kind=projected", "integration.engine=compiled")
@@ -120,20 +143,35 @@ def test_times_without_the_target_are_shaded_and_said(run, rows, begins):
     assert ends == ([] if begins is None else [pytest.approx((begins, 0.18))])
 
 
+def test_what_is_drawn_of_a_run_by_hand_is_what_its_log_says():
+    hand, moving = run_by_hand(), run_by_hand("acrobot_moving_tag")
+    error = servo_figures.error_figure(hand)
+    for panel, values in zip(
+        error.axes[-2:], (1e3 * ESTIMATE_OFF, np.degrees(ESTIMATE_TURNED)), strict=True
+    ):
+        np.testing.assert_allclose(panel.lines[0].get_ydata(), values, atol=1e-6)
+    off = servo_figures.image_path_figure(moving).axes[1].lines[0].get_ydata()
+    goal = moving.image_path[2][1]  # a line is not the ideal one
+    np.testing.assert_allclose(off, np.linalg.norm(SEEN[FOUND] - goal, axis=1))
+    outside = run_by_hand("acrobot_eye_to_hand")
+    for run, point, line in ((hand, "target, Oo", True), (outside, "camera, Co", False)):
+        axes = servo_figures.platform_path_figure(run).axes[0]
+        paths = {each.get_label(): len(each.get_data_3d()[0]) for each in axes.lines}
+        assert paths[point] == 1
+        assert ("camera, straight line" in paths) == line
+
+
 # Motors and sensors.
-
-
-@pytest.fixture(scope="module")
-def sensors():
-    overrides = [*SHORT, "duration=0.6", "winches.kind=motor"]
-    return ServoRun(load_scenario("acrobot_sensors", overrides)).simulate()
 
 
 def errors(axes):
     return np.array([line.get_ydata() for line in axes.get_lines()])
 
 
-def test_errors_of_readings_are_those_at_the_instant_of_the_reading(sensors):
+def test_errors_of_readings_are_those_at_the_instant_of_the_reading():
+    sensors = ServoRun(
+        load_scenario("acrobot_sensors", [*SHORT, "duration=0.6", "winches.kind=motor"])
+    ).simulate()
     figures = drawn_of(sensors, sections.MOTORS, *SENSING)
     assert list(figures) == ["motor_torques", "readings"]
     figure = figures["readings"]()
@@ -217,7 +255,7 @@ def test_all_are_drawn_whatever_is_read(rows, value):
             draw().draw_without_rendering()
 
 
-def test_the_scale_of_colours_is_apart_from_the_panel_beside_it():
+def test_scans_are_seen_from_above_and_scales_are_apart_from_the_panel_beside_them():
     """And so are their labels, as they are drawn into a file."""
     drawn = looking(20, 1.5, np.full((240, 320), 1.5))
     for name in ("depth", "scan_fan"):
@@ -226,6 +264,39 @@ def test_the_scale_of_colours_is_apart_from_the_panel_beside_it():
         scale = next(axes for axes in figure.axes if axes.get_ylabel() == "distance [m]")
         end, begin = (axes.yaxis.label.get_window_extent() for axes in (scale, figure.axes[1]))
         assert begin.x0 - end.x1 > LABELS_APART * figure.dpi, name
+    ahead, left = figure.axes[1].lines[0].get_data()  # a fan ahead, from the right to the left
+    assert np.argmax(ahead) == 2
+    assert left[0] < left[2] == 0.0 < left[-1]
+    np.testing.assert_allclose(np.hypot(ahead, left), 1.5)
+    odometry = drawn["odometry"]().axes[1].lines[0].get_ydata()
+    np.testing.assert_allclose(odometry, 1e3 * np.linalg.norm([0.1, 0.2, 0.3]))
+
+
+def test_numbers_of_a_camera_on_joints_are_those_of_the_log():
+    """The target is in the image at 1 s and from 4 s on, pan at its limit from 1 s to 4 s."""
+    joints = np.radians([[0.0, 0.0], [30.0, 0.0], [30.0, 5.0], [10.0, 5.0]])
+    off = np.radians([[0.3, 0.0], [-0.3, 0.2], [0.3, 0.0], [-0.3, 0.2]])
+    seen = [[0.0, 0.0], [303.0, 204.0], [0.0, 0.0], [300.0, 212.0]]
+    log = {
+        "time": np.array([0.0, 1.0, 2.0, 4.0]), LOGGED_JOINTS: joints,
+        LOGGED_ENCODERS: joints + off, LOGGED_FOUND: np.array([[0.0], [1.0], [0.0], [1.0]]),
+        LOGGED_IMAGE: np.tile(seen, (1, 4)) + np.array([1.0, 2, -1, 2, -1, -2, 1, -2]),
+    }  # fmt: skip
+    limits = {"lower_deg": [-30.0, -30.0], "upper_deg": [30.0, 30.0], "counts_per_turn": 4096}
+    run = by_hand(
+        log, built=SimpleNamespace(pinhole=SimpleNamespace(cx=300.0, cy=200.0)),
+        scenario=SimpleNamespace(camera=SimpleNamespace(pan_tilt=SimpleNamespace(**limits))),
+    )  # fmt: skip
+    numbers = pan_tilt_numbers(run)
+    assert numbers.pop("off_center_px") == pytest.approx({"median": 8.5, "end": 12.0})
+    expected = {
+        "first_seen_s": 1.0, "unseen_after_s": 2.0, "largest_angles_deg": [30.0, 5.0],
+        "at_limits_s": 3.0, "encoder_error_deg": [0.3, 0.2 / np.sqrt(2.0)],
+    }  # fmt: skip
+    assert numbers == {key: pytest.approx(value) for key, value in expected.items()}
+    log[LOGGED_FOUND] = np.zeros((4, 1))
+    blind = pan_tilt_numbers(run)
+    assert [blind[key] for key in ("first_seen_s", "unseen_after_s")] == [None, None]
 
 
 # What was learnt.
@@ -234,23 +305,95 @@ PANELS_APART = 0.1
 """Between a panel and the label of the next one [inch]."""
 
 
+ROBOT = load_robot("acrobot_small")
+CABLES, M = ROBOT.cable_set(), len(ROBOT.cables)
+POINTS = np.concatenate([CABLES.p_WA.T.ravel(), CABLES.p_PB.T.ravel()])
+
+
+def learning(errors, sigma, **parts):
+    """A log of points and of offsets of 2 cm that are learnt with errors [m]."""
+    rows = len(errors)
+    values = dict.fromkeys(ADAPTATION_PARTS, 0.0) | {"stations": 20.0} | parts
+    truth = np.concatenate([POINTS, np.full(M, 0.02)])
+    return {
+        LEARNT: truth + errors, LEARNT_SIGMA: sigma, DOUBTED: np.zeros((rows, M + 8)),
+        ADAPTATION: np.tile(list(values.values()), (rows, 1)), OPEN_FRAMES: np.zeros((rows, 12)),
+    }  # fmt: skip
+
+
 def test_no_legend_hides_numbers_that_rise_early_and_labels_are_as_long_as_axes():
-    robot, time = load_robot("acrobot_small"), np.linspace(0.0, 8.0, 81)
-    cables, m = robot.cable_set(), len(robot.cables)
-    truth = np.concatenate([cables.p_WA.T.ravel(), cables.p_PB.T.ravel(), np.zeros(m)])
-    log = {
-        "time": time,
-        LEARNT: truth + 0.0117 * np.exp(-time)[:, None],
-        LEARNT_SIGMA: np.full((81, 7 * m), 0.01),
-        ADAPTATION: np.outer(1.0 - np.exp(-3.0 * time), np.full(len(ADAPTATION_PARTS), 20.0)),
-    }
-    figure = drawn_of(by_hand(log, robot=robot), LEARNT_POINTS)["adaptation"]()
+    time, sigma = np.linspace(0.0, 8.0, 81), np.full((81, 7 * M), 0.01)
+    sigma[:, [7, 11]] = 0.005  # of two exit points
+    falls = np.tile(0.0117 * np.exp(-time)[:, None], (1, 7 * M))
+    log = {"time": time, **learning(falls, sigma)}
+    log[ADAPTATION] = np.outer(1.0 - np.exp(-3.0 * time), np.full(len(ADAPTATION_PARTS), 20.0))
+    figure = drawn_of(by_hand(log, robot=ROBOT), LEARNT_POINTS)["adaptation"]()
     assert figure_faults(figure) == []
-    errors = [figure.axes[k].lines[1].get_ydata() for k in (0, 1, 3, 4)]
-    np.testing.assert_allclose(errors, np.tile(11.7 * np.exp(-time), (4, 1)), rtol=1e-9)
+    curves = [figure.axes[k].lines[1].get_ydata() for k in (0, 1, 3, 4)]
+    np.testing.assert_allclose(curves, np.tile(11.7 * np.exp(-time), (4, 1)), rtol=1e-9)
+    names = [axes.get_ylabel() for axes in figure.axes[:2]]
+    assert names == ["C3.exit point.y, error [mm]", "C4.exit point.z, error [mm]"]
+    (band,) = figure.axes[0].collections
+    assert band.get_datalim(figure.axes[0].transData).y1 == pytest.approx(11.7 + 3.0 * 5.0)
     for row in np.reshape(figure.axes, (2, 3)):
         for axes in row:
             assert axes.yaxis.label.get_window_extent().height < axes.bbox.height
         for left, right in pairwise(row):
             begin = right.yaxis.label.get_window_extent().x0
             assert begin - left.bbox.x1 > PANELS_APART * figure.dpi
+
+
+def test_numbers_of_what_was_learnt_are_those_of_the_log():
+    """The target is seen from the second row on; of the row before are the true lengths."""
+    errors, sigma = np.full((3, 7 * M), 1e-3), np.full((3, 7 * M), 1e-3)
+    errors[-1, -M:], sigma[0], sigma[-1, 4] = 4e-3, 0.01, 8e-3
+    log, home = learning(errors, sigma, scatter=1.2, models_believed=2.0), ROBOT.home.transform()
+    tensions = np.array([5.0, 10.0, 20.0])[:, None] * np.ones(M)
+    lengths = cable_paths(home, CABLES).lengths / (1.0 + tensions / CABLES.stiffness)
+    log |= {
+        "found": np.array([[0.0], [1.0], [1.0]]), "tensions": tensions,
+        "unstrained_lengths": lengths + np.array([[0.02], [0.03], [0.04]]),
+    }  # fmt: skip
+    log[OPEN_FRAMES][-1, 3] = 0.95
+    believed = replace(CABLES, p_WA=CABLES.p_WA + 2e-3, p_PB=CABLES.p_PB + 2e-3)
+    # The lengths are those of the believed points, here the true ones for a number by hand.
+    built = SimpleNamespace(believed=SimpleNamespace(cables=CABLES, X_WP0=home))
+    numbers = adaptation_numbers(by_hand(log, robot=ROBOT, built=built))
+    expected = {
+        "directions": 7 * M, "scatter": 1.2, "models_believed": 2, "points_rms_before_m": 0.0,
+        "points_rms_after_m": 1e-3, "offsets_rms_after_m": 4e-3, "largest_error_in_sigmas": 4.0,
+        "not_told": ["C2.exit_point.y"], "open_frames": [FRAMES[3]], "doubts": [],
+    }  # fmt: skip
+    assert {key: numbers[key] for key in expected} == {
+        key: pytest.approx(value) if isinstance(value, float) else value
+        for key, value in expected.items()
+    }
+    built.believed.cables = believed
+    before = adaptation_numbers(by_hand(log, robot=ROBOT, built=built))["points_rms_before_m"]
+    assert before == pytest.approx(2e-3)
+    log["found"] = np.zeros((3, 1))
+    assert np.all(np.isnan(true_offsets(by_hand(log, built=built))))
+
+
+@pytest.mark.parametrize(
+    ("parts", "dropped", "words"),
+    [
+        ({}, {}, None),
+        ({"stations": 0.0}, {}, "nothing was learnt: no pose counted"),
+        ({"refused": 5.0}, {}, "measurements at 5 of 25 poses contradict each other"),
+        ({"refused": 1.0}, {}, None),
+        ({"scatter": 9.0}, {}, "measurements scatter 3.0 times as much as their standard"),
+        ({"surprise": 2.0}, {}, "points are farther from what was believed than"),
+        ({"models_rejected": 3.0}, {}, "3 models were rejected by the stability criterion"),
+        ({}, {3: 4.0}, "the length of C4 contradicts all else at 4 of 20 poses"),
+        ({}, {3: 1.0}, None),  # once may be by chance
+        ({"stations": 100.0}, {3: 5.0}, None),  # and so may some of many
+        ({}, {M + 5: 2.0}, "corner 3 of the tag in v contradicts all else at 2 of 20 poses"),
+    ],
+)
+def test_doubts_are_said_in_words(parts, dropped, words):
+    log = learning(np.zeros((2, 7 * M)), np.ones((2, 7 * M)), **parts)
+    log[DOUBTED][-1, list(dropped)] = list(dropped.values())
+    said = doubts(log, [cable.name for cable in ROBOT.cables])
+    assert len(said) == (words is not None)
+    assert words is None or said[0].startswith(words)

@@ -46,6 +46,12 @@ def always_checkpoints(monkeypatch):
             "integration.loop=compiled", PROJECTED, "camera.latency_frames=1",
             "estimator.kind=fusion", "sensors.log=[tension, encoder, tracker]",
         )),
+        ("acrobot_switching", (
+            "integration.loop=compiled", PROJECTED, "estimator.compare=[first_image]",
+        )),
+        ("acrobot_slack_start_tca", (
+            "integration.loop=compiled", PROJECTED, "sensors.log=[tension]",
+        )),
         ("acrobot_pick_and_place", (PROJECTED,)),
         ("cable_arm_computed_torque", ()),
         ("mobile_bases_winches", ()),
@@ -75,35 +81,30 @@ def test_an_interruption_keeps_a_checkpoint_at_that_step(tmp_path, monkeypatch):
     assert again.outcome == Outcome.TIMEOUT
 
 
-def test_a_damaged_checkpoint_and_one_of_another_run_are_named(tmp_path):
+def test_what_a_killed_run_left_is_read_as_far_as_it_is_whole_and_refused_where_it_is_not(tmp_path):
     loaded = load_scenario("planar_pbvs", [PROJECTED, "duration=0.3"])
-    begun(loaded, tmp_path)
     other = load_scenario("acrobot_pbvs", [PROJECTED, "duration=0.3"])
-    with pytest.raises(CheckpointError, match=r"checkpoint.npz: cannot be used"):
-        KINDS[other.kind](other).simulate(tmp_path)
-    (tmp_path / log.PARTS / "time.f8").write_bytes(b"")
-    with pytest.raises(CheckpointError, match="found 0 rows of the log; accepted: the"):
-        KINDS[loaded.kind](loaded).simulate(tmp_path)
-    (tmp_path / log.PARTS / log.CHECKPOINT).write_bytes(b"half")
-    with pytest.raises(CheckpointError, match=r"cannot be used.*add overwrite"):
-        KINDS[loaded.kind](loaded).simulate(tmp_path)
-
-
-def test_what_a_killed_run_left_is_read_as_far_as_its_rows_are_whole(tmp_path):
-    loaded = load_scenario("planar_pbvs", [PROJECTED, "duration=0.3"])
     begun(loaded, tmp_path)
-    parts = tmp_path / log.PARTS
+    parts, kind = tmp_path / log.PARTS, KINDS[loaded.kind]
     rows = log.DiskLog(parts).rows
     with (parts / "X_WP.f8").open("ab") as file:
         file.write(b"part of a row")
-    run = KINDS[loaded.kind](loaded).recover(tmp_path)
+    run = kind(loaded).recover(tmp_path)
     assert len(run.log["X_WP"]) == len(run.log["time"]) == rows > 1
     assert run.as_dict()["message"] == "the program ended before the run did"
     np.testing.assert_array_equal(log.log_block(run.log, "X_WP", 1, 3), run.log["X_WP"][1:3])
     assert run.columns()["X_WP.z_m"][-1] == run.log["X_WP"][-1, 6]
+    with pytest.raises(CheckpointError, match=r"checkpoint.npz: cannot be used"):
+        kind(other).simulate(tmp_path)
+    (parts / "time.f8").write_bytes(b"")
+    with pytest.raises(CheckpointError, match="found 0 rows of the log; accepted: the"):
+        kind(loaded).simulate(tmp_path)
+    (parts / log.CHECKPOINT).write_bytes(b"half")
+    with pytest.raises(CheckpointError, match=r"cannot be used.*add overwrite"):
+        kind(loaded).simulate(tmp_path)
     (parts / log.LAYOUT).write_text("half")
     with pytest.raises(OutputFolderError, match="no log that can be read"):
-        KINDS[loaded.kind](loaded).recover(tmp_path)
+        kind(loaded).recover(tmp_path)
 
 
 def test_a_log_that_grows_beyond_memory_is_the_same(tmp_path, monkeypatch):

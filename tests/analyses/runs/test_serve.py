@@ -17,6 +17,8 @@ import pytest
 
 from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.errors import ClientEndedError
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.remote.remote_client import RemoteClient
 from tests.cli.commands import ended, refuse
 from tests.cli.conftest import only
@@ -81,6 +83,9 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
 
     def drive():
         with RemoteClient(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
+            home = pose_row(load_robot("acrobot_large").home.transform())
+            _, feasible = client.distribute(home, np.zeros(6), method="quadratic_program")
+            assert not feasible  # with the scenario's limits; the robot's are from 0 N on
             now = client.start([])
             while now.time < 0.1:
                 now = client.step(tensions=np.full(8, 5.0))
@@ -116,20 +121,14 @@ def test_what_was_simulated_is_written(capsys, tmp_path, ending):
     assert len(line) < 500
 
 
-def test_nobody_comes_and_a_door_that_is_open(capsys, tmp_path):
-    out = tmp_path / "out"
-    code = ended(
-        "serve", *SCENARIO, "--port", "0", "--host", "0.0.0.0", "--wait", "0", "--out", str(out)
-    )
+def test_nobody_comes_a_door_that_is_open_and_a_signal_while_it_waits(capsys, tmp_path):
+    out, port = tmp_path / "out", free_port()
+    code = ended("serve", *SCENARIO, "--port", 0, "--host", "0.0.0.0", "--wait", 0, "--out", out)
     err = printed(capsys).err
     assert code == ClientEndedError.exit_code
     assert "open to other machines" in err
     assert err.splitlines()[-1] == "cdpr: no client came within 0 s; nothing was simulated"
     assert not out.exists()
-
-
-def test_a_signal_while_it_waits(capsys, tmp_path):
-    out, port = tmp_path / "out", free_port()
 
     def ask_and_stop():
         with RemoteClient(f"tcp://127.0.0.1:{port}", timeout=LONG) as client:
@@ -138,6 +137,7 @@ def test_a_signal_while_it_waits(capsys, tmp_path):
 
     thread = threading.Thread(target=ask_and_stop)
     thread.start()
-    assert ended("serve", *SCENARIO, "--port", str(port), "--out", str(out)) == INTERRUPTED
+    assert ended("serve", *SCENARIO, "--port", port, "--out", out) == INTERRUPTED
     thread.join()
+    assert "open to other machines" not in printed(capsys).err
     assert not out.exists()

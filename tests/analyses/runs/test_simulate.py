@@ -17,8 +17,9 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame import words as argument_words
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs import log, simulate
+from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.servo_figures import error_figure
-from cdpr_drake.errors import CdprError, OutputFolderError, ScenarioError
+from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.kernel_cache.kernel_list import needed_kernels
 from cdpr_drake.models import rendered_camera
 from cdpr_drake.models.robot_loader import robot_file
@@ -37,14 +38,6 @@ SHORT = ("simulate", "--camera", "projected", "--duration", "0.1")
 SERVO = ("simulate", "acrobot_pbvs", "--camera", "projected", "--duration", "0.3")
 TENSIONS = ("simulate", "acrobot_computed_torque", "--set", "integration.engine=plant",
             "--duration", "0.3")  # fmt: skip
-COMPILED = ("--set", "integration.engine=compiled", "--set", "integration.loop=compiled")
-
-
-@pytest.fixture
-def without_figures():
-    """Nobody looks at figures, which take longer to draw than a run to compute."""
-    with only(".mat", ".parquet"):
-        yield
 
 
 def interrupted(scenario, folder, sim_time):
@@ -70,16 +63,11 @@ def same_files(one, other):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_it_writes_a_folder_and_prints_json(capsys, here):
+@pytest.mark.usefixtures("without_pictures")
+def test_it_writes_a_folder_prints_json_numbers_its_folders_and_takes_overrides(capsys, here):
     summary = told(capsys, *SHORT, "--out", "there", "--seed", "4")
     assert (summary["seed"], summary["outcome"]) == (4, "timeout")
     assert json.loads((here / "there" / "summary.json").read_text()) == summary
-    assert os.listdir(here) == ["there"]
-
-
-@pytest.mark.usefixtures("without_figures")
-def test_without_out_it_numbers_its_folders_and_takes_overrides(capsys, here):
     # The end of a chosen duration is no timeout.
     assert "acrobot_pbvs_taut: ended at 0.1 s, as asked" in answer(capsys, *SHORT)
     goal = ("--set", "desired.position=[0.1, 0, 0.09]")
@@ -87,8 +75,8 @@ def test_without_out_it_numbers_its_folders_and_takes_overrides(capsys, here):
     assert code == 0
     assert "warning: acrobot_pbvs_taut: desired: the camera does not see all of the target" in err
     assert sorted(os.listdir("runs")) == ["acrobot_pbvs_taut", "acrobot_pbvs_taut-2"]
-    text = (here / "runs" / "acrobot_pbvs_taut-2" / "scenario.yaml").read_text()
-    assert "lambda_0: 1.25" in text
+    assert "lambda_0: 1.25" in (here / "runs/acrobot_pbvs_taut-2/scenario.yaml").read_text()
+    assert sorted(os.listdir(here)) == ["runs", "there"]
 
 
 def test_arguments_of_the_verb_are_settings_of_the_scenario():
@@ -133,11 +121,8 @@ def test_a_robot_is_refused_with_the_commands_that_take_it(capsys, here):
 
 
 def test_formats_alone_and_together_and_what_is_accepted(capsys):
-    for words, formats in (
-        ("png", ("png",)), ("pdf,svg", ("pdf", "svg")), ("svg, PDF", ("svg", "pdf")),
-        ("png,png", ("png",)),
-    ):  # fmt: skip
-        assert tuple(argument_words.formats(words)) == formats
+    for words, formats in (("png,png", ["png"]), ("svg, PDF", ["svg", "pdf"])):
+        assert list(argument_words.formats(words)) == formats
     for words in ("", "jpg", "png,", "png pdf", "../png", "png,eps"):
         said = refuse(capsys, "simulate", f"--figure-format={words}")
         assert f"--figure-format: found {words!r}; accepted: png, pdf, svg" in said
@@ -175,24 +160,16 @@ def test_a_broken_graphics_driver_is_one_line(capsys, here, monkeypatch):
     assert not any(here.iterdir())
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_a_timeout_says_limits_slack_cables_and_keys(capsys, here):
-    words = (
-        "simulate",
-        "acrobot_pbvs",
-        "--camera",
-        "projected",
-        "--set",
-        "duration=0.6",
-        *COMPILED,
-    )
-    out = " ".join(answer(capsys, *words, "--out", "out").split())
-    summary = json.loads((here / "out" / "summary.json").read_text())
-    assert summary["outcome"] == "timeout"
+    loop = ("--set", "integration.engine=compiled", "--set", "integration.loop=compiled")
+    out = " ".join(answer(capsys, *SERVO[:4], "--set", "duration=0.6", *loop).split())
+    summary = json.loads((here / "runs" / "acrobot_pbvs" / "summary.json").read_text())
+    assert (summary["outcome"], summary["loop"]) == ("timeout", "compiled")
     assert summary["slack_cable_seconds"] > 0.0
     for words in (
-        "expected converged", "duration = 0.6 s was over", "stop.position = 0.3 mm",
-        "stop.rotation_deg = 0.5 deg", "cables were slack: C", "to change: ", "duration (longer)",
-        "initial_pose", "tension_management",
+        "expected converged", "duration = 0.6 s was over", "stop.rotation_deg = 0.5 deg",
+        "cables were slack: C", "to change: ", "initial_pose", "tension_management",
     ):  # fmt: skip
         assert words in summary["message"]
         assert words in out
@@ -210,24 +187,24 @@ distribution: {limits: LIMITS}
 """
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_limits_that_replace_those_of_the_robot_are_said(capsys, here):
-    (here / "bay.yaml").write_text(OWN_ROBOT.read_text())
-    for limits, used, said in (
+@pytest.mark.usefixtures("without_pictures")
+@pytest.mark.parametrize(
+    ("limits", "used", "remarks"),
+    [
         ("[1.0, 60.0]", [1.0, 60.0],
-         "distribution.limits = 1 to 60 N replace tension_bounds of bay, 4 to 350 N"),
-        ("[4.0, 350.0]", [4.0, 350.0], ""),
-        ("null", [4.0, 350.0], ""),
-    ):  # fmt: skip
-        (here / "tracking.yaml").write_text(TRACKING.replace("LIMITS", limits))
-        words = ("simulate", "tracking.yaml", "--json", "--out", "out", "--overwrite")
-        code, out, err = run(capsys, *words)
-        found = json.loads(out)
-        assert (code, found["tension_limits_n"]) == (0, used)
-        assert bool(found["remarks"]) == bool(said)
-        assert all(said in words for words in found["remarks"])
-        assert ("replace tension_bounds" in err) == bool(said)
-        assert used[0] <= found["tension_n"]["min"] <= found["tension_n"]["max"] <= used[1]
+         ["distribution.limits = 1 to 60 N replace tension_bounds of bay, 4 to 350 N; null takes "
+          "those"]),
+        ("null", [4.0, 350.0], []),
+    ],
+)  # fmt: skip
+def test_limits_that_replace_those_of_the_robot_are_said(limits, used, remarks, capsys, here):
+    (here / "bay.yaml").write_text(OWN_ROBOT.read_text())
+    (here / "tracking.yaml").write_text(TRACKING.replace("LIMITS", limits))
+    code, out, err = run(capsys, "simulate", "tracking.yaml", "--json")
+    summary = json.loads(out)
+    assert (code, summary["tension_limits_n"], summary["remarks"]) == (0, used, remarks)
+    assert ("replace tension_bounds" in err) == bool(remarks)
+    assert used[0] <= summary["tension_n"]["min"] <= summary["tension_n"]["max"] <= used[1]
 
 
 # Interrupted runs.
@@ -282,7 +259,7 @@ def test_sigterm_keeps_what_was_simulated(here):
     assert asked <= listed, "python -m tests.record_kernels makes a new list"
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 @pytest.mark.parametrize("words", [SERVO, TENSIONS], ids=["servo", "tensions"])
 def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_figures(
     words, here, capsys, monkeypatch
@@ -299,7 +276,6 @@ def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_fig
     assert "scenario.seed is 0 there, 5 here; name another folder or add --overwrite" in asked
     assert ended(*words, "--out", "out") == 0
     same_files(here / "whole", here / "out")
-    assert "holds complete results of this command" in refuse(capsys, *words, "--out", "out")
 
     class EndedError(BaseException):
         """The process ends while figures are drawn."""
@@ -316,7 +292,54 @@ def test_the_same_command_goes_on_from_a_kill_an_interruption_and_half_drawn_fig
     same_files(here / "whole", here / "drawn")
 
 
-@pytest.mark.usefixtures("without_figures")
+KINDS = {
+    "servo": SERVO, "tensions": TENSIONS,
+    "pick and place": ("simulate", "acrobot_pick_and_place", "--camera", "projected",
+                       "--duration", "0.2"),
+    "mechanism": ("simulate", "cable_arm_computed_torque", "--duration", "0.1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("words", KINDS.values(), ids=KINDS)
+def test_a_complete_run_is_read_again_and_what_is_missing_is_drawn(
+    words, here, capsys, monkeypatch
+):
+    with only("replay.html"):
+        numbers = told(capsys, *words, "--out", "whole")
+    with only("none"):
+        told(capsys, *words, "--out", "out")
+    monkeypatch.setattr(Run, "simulate", None)  # nothing is simulated
+    before = (here / "out" / "log.npz").stat()
+    with only("replay.html"):
+        code, out, err = run(capsys, *words, "--out", "out", "--json")
+    assert (code, "reused the run of out" in err) == (0, True)
+    again = json.loads(out)
+    for summary in (numbers, again):
+        del summary["wall_time_s"], summary["realtime_factor"]
+    assert again == numbers
+    same_files(here / "whole", here / "out")
+    assert (here / "out" / "log.npz").stat() == before
+    drawn = (here / "out" / "replay.html").stat()
+    with only(".mat", "replay.html"):
+        table = answer(capsys, *words, "--out", "out", "--log-format", "mat")
+        assert table == answer(capsys, *words, "--out", "out", "--plot", "figure.svg")
+    assert (here / "out" / "replay.html").stat() == drawn
+    assert (here / "out" / "log.mat").is_file()
+    assert (here / "figure.svg").is_file()
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_a_run_without_all_its_files_is_simulated_again(here):
+    assert ended(*SERVO, "--out", "whole") == 0
+    for name in ("log.csv", "log.npz", "summary.json"):
+        shutil.copytree(here / "whole", here / "out")
+        (here / "out" / name).unlink()
+        assert ended(*SERVO, "--out", "out") == 0
+        same_files(here / "whole", here / "out")
+        shutil.rmtree(here / "out")
+
+
+@pytest.mark.usefixtures("without_pictures")
 def test_an_interrupted_run_is_found_without_out_and_is_finished_by_its_name(here, capsys):
     scenario = load_scenario("planar_pbvs", ["camera.kind=projected", "duration=0.4"])
     base, words = here / "runs" / "planar_pbvs", ("planar_pbvs", "--camera", "projected")
@@ -333,9 +356,11 @@ def test_an_interrupted_run_is_found_without_out_and_is_finished_by_its_name(her
             np.testing.assert_array_equal(part[name], whole[name][: len(part[name])])
     assert not (here / "left" / log.PARTS).exists()
     assert "left: found no log of an interrupted run" in refuse(capsys, "finish", "left")
+    said = refuse(capsys, "simulate", *words, "--duration", "0.4", "--out", "left")
+    assert "left: holds other results: interrupted_at_s is 0.2 there, not here; name" in said
 
 
-@pytest.mark.usefixtures("without_figures")
+@pytest.mark.usefixtures("without_pictures")
 def test_a_full_disk_keeps_what_was_simulated(here, capsys, monkeypatch):
     append = log.DiskLog.append
 
@@ -355,28 +380,12 @@ def test_a_full_disk_keeps_what_was_simulated(here, capsys, monkeypatch):
     assert not (here / "out" / log.PARTS).exists()
 
 
-@pytest.mark.usefixtures("without_figures")
-def test_two_writers_foreign_and_changed_files_are_refused_and_nothing_is_removed(here, capsys):
-    words = (*SHORT, "--out", "out")
-    lines = []
-
-    def second(now):
-        if not lines and now.done > 0.0:
-            with pytest.raises(OutputFolderError) as problem:
-                cdpr.simulate("planar_pbvs", camera="projected", folder="out")
-            lines.append(str(problem.value))
-
-    cdpr.simulate(
-        DEFAULT_SCENARIO, camera="projected", duration=0.1, folder="out", follow=Follow(second)
-    )
-    assert "another command writes there" in lines[0]
-    (here / "out" / "mine.txt").write_text("mine")
-    assert "holds files that cdpr did not write" in refuse(capsys, *words, "--overwrite")
-    (here / "out" / "mine.txt").unlink()
-    time.sleep(0.01)  # a file of the same instant as the marker is not newer
-    (here / "out" / "scenario.yaml").write_text("name: mine")
-    assert "scenario.yaml" in refuse(capsys, *words, "--overwrite")
-    assert (here / "out" / "scenario.yaml").read_text() == "name: mine"
+@pytest.mark.usefixtures("without_pictures")
+def test_a_run_holds_no_log_open_once_it_is_written(here):
+    result = cdpr.simulate(DEFAULT_SCENARIO, camera="projected", duration=0.1, folder="out")
+    held = [path.resolve().name for path in Path("/proc/self/fd").iterdir()]
+    assert result.log["time"][-1] == pytest.approx(0.1)
+    assert "log.npz" not in held
 
 
 def test_warnings_go_to_the_log_if_nobody_follows_and_else_to_who_does(caplog):
@@ -391,16 +400,6 @@ def test_warnings_go_to_the_log_if_nobody_follows_and_else_to_who_does(caplog):
         f"warning: {words}" for words in told
     ]
     assert caplog.records == []
-
-
-def test_ctrl_c_in_python_ends_the_run_with_what_it_has(monkeypatch):
-    def interrupt(now):
-        if now.done > 0.15:
-            raise KeyboardInterrupt
-
-    run = cdpr.simulate("planar_pbvs", camera="projected", follow=Follow(interrupt))
-    assert run.outcome == Outcome.INTERRUPTED
-    assert len(run.log["time"]) > 1
 
 
 def test_kinds_are_those_of_scenario_files():

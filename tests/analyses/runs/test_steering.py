@@ -9,13 +9,14 @@ import pytest
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
+from cdpr_drake.analyses.runs.samples import MarksPicture
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.steering import (
     BREAK,
+    FASTEST_SPEED,
     PUSH,
     UNTOUCHED,
     ByHand,
-    MarksPicture,
     Message,
     Pace,
     Steering,
@@ -97,11 +98,18 @@ def scenario(*settings):
     return load_scenario("acrobot_pbvs", (*SETTINGS, *settings))
 
 
-def by_hand(loaded, *acts):
-    """A run with acts at their times, and its messages by kind."""
-    ours, theirs = Pipe()
+def by_hand(loaded, *acts, enough=lambda messages: False):
+    """A run with acts at their times, and its messages by kind, of which some are enough."""
+    (ours, theirs), messages = Pipe(), {}
+
+    def read():
+        while ours.poll(0.0):
+            message = receive(ours)
+            messages.setdefault(message.kind, []).append(message.data)
+        return enough(messages)
+
     with ours, theirs:
-        steering, todo = Steering(loaded, theirs), list(acts)
+        steering, todo = Steering(loaded, theirs, read), list(acts)
 
         def prepare(run, simulator, diagram):
             steering.prepare(run, simulator, diagram)
@@ -116,10 +124,7 @@ def by_hand(loaded, *acts):
             simulator.set_monitor(monitor)
 
         run = ServoRun(loaded).simulate(follow=Follow(prepare=prepare, stop=steering.stop))
-        messages = {}
-        while ours.poll(0.0):
-            message = receive(ours)
-            messages.setdefault(message.kind, []).append(message.data)
+        read()
     return run, messages
 
 
@@ -149,12 +154,34 @@ def test_a_run_that_nobody_touches_is_as_without_and_a_stop_ends_it():
     assert "event" not in messages
     np.testing.assert_array_equal(untouched.log["time"], plain.log["time"])
     np.testing.assert_allclose(untouched.log["X_WP"], plain.log["X_WP"], atol=SPLIT)
-    stopped, _ = by_hand(scenario(*OPEN), (0.2, {"what": "stop"}))
+    fast = {"what": "speed", "factor": 1e9}
+    stopped, messages = by_hand(scenario(*OPEN), (0.1, fast), (0.2, {"what": "stop"}))
+    assert [pace["speed"] for pace in messages["pace"]][:2] == [None, FASTEST_SPEED]
     assert stopped.stopped
     assert 0.2 <= stopped.sim_time < 0.6
 
 
-def test_acts_that_are_not_accepted_are_refused_in_a_line():
+def test_a_run_that_stands_shows_once_how_it_stands():
+    calls, looks = [], []
+
+    def enough(messages):
+        """It stands and has waited for some looks; one that shows nothing ends at last, too."""
+        calls.append(0)
+        looks.extend(pace for pace in messages.get("pace", [])[-1:] if pace["paused"])
+        return len(looks) > 3 or len(calls) > 300
+
+    run, messages = by_hand(scenario(*OPEN), (0.1, {"what": "pause"}), enough=enough)
+    assert run.stopped
+    assert run.sim_time == looks[0]["t"] == pytest.approx(0.1, abs=0.02)
+    assert sum(pace["paused"] for pace in messages["pace"]) == 1
+    assert [image["t"] for image in messages["image"]].count(run.sim_time) == 1
+
+
+def test_acts_loops_and_sockets_that_are_not_accepted_are_refused_in_a_line():
+    with pytest.raises(CdprError, match="steered_by: found -5; accepted: the number of an open"):
+        steered(NOBODY, scenario(), -5)
+    with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but"):
+        check_steered(scenario("integration.loop=compiled"))
     assert ByHand(scenario()).takes == ()
     # With failures of its own the times of events are fixed.
     failing = "failures={events: [{kind: cable_breaks, time: 0.2, cable: 1}]}"
@@ -171,13 +198,6 @@ def test_acts_that_are_not_accepted_are_refused_in_a_line():
         assert words.pop(0) == f"cable: found {number}; accepted: 0, 1, 3, 4, 5, 6, 7"
     assert words[0].startswith("force: found [0.0, 0.0, 0.0]; accepted: three numbers")
     assert words[1].startswith("seconds: found 1000000000.0; accepted: above 0 to 60 s")
-
-
-def test_a_loop_and_no_socket_are_refused():
-    with pytest.raises(CdprError, match="steered_by: found -5; accepted: the number of an open"):
-        steered(NOBODY, scenario(), -5)
-    with pytest.raises(ScenarioError, match=r"integration\.loop: found compiled, but"):
-        check_steered(scenario("integration.loop=compiled"))
 
 
 def test_a_run_that_was_acted_on_never_goes_on_from_the_middle(tmp_path):

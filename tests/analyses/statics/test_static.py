@@ -13,7 +13,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+from tests.analyses.verbs.verb_checks import as_json, one_line, shows_itself
 from tests.cli.commands import answer, told
 from tests.figure_faults import figure_faults
 

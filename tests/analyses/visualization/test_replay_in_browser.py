@@ -54,6 +54,13 @@ def run(tmp_path_factory):
     return path, log
 
 
+LEFT_EDGE = """
+    const chart = document.getElementById("cdpr-plot");
+    return [...chart.getContext("2d").getImageData(0, 0, 1, chart.height).data];
+"""
+"""Pixels of the first column of the chart of tensions."""
+
+
 def opened(browser, path, at=""):
     browser.get("about:blank")
     browser.get(f"file://{path}{at}")
@@ -141,6 +148,7 @@ def test_scrubbing_shows_the_time_and_tensions_of_the_log(browser, run):
     scrub(browser, 1.4)
     slack = browser.find_elements("css selector", ".cdpr-value.cdpr-slack")
     assert [cell.text.split()[:2] for cell in slack] == [["C3", "slack"]]
+    assert not any(browser.execute_script(LEFT_EDGE)), "a label of the chart is cut off"
     assert complaints(browser) == []
 
 

@@ -15,7 +15,7 @@ from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from tests.analyses.front.front_checks import as_json, one_line
+from tests.analyses.verbs.verb_checks import as_json, one_line
 from tests.cli.conftest import only
 from tests.messages import printed
 

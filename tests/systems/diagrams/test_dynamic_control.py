@@ -63,8 +63,6 @@ def failures(control, context):
     ("name", "method"),
     [
         ("acrobot_large", "quadratic_program"),
-        ("acrobot_large", "barycenter"),
-        ("caroca", "barycenter"),
         ("planar", "quadratic_program"),
     ],
 )
@@ -108,19 +106,10 @@ def test_a_log_has_the_values_of_public_ports():
         here = here if name in OUTPUTS else pose_row(here)
         np.testing.assert_allclose(log[name][-1], here, rtol=0.0, atol=ROUNDING, err_msg=name)
         assert len(log[name]) == len(log["time"])
+    alone = there_and_back("planar").diagram.GetSystems()  # without a log
+    named = {system.get_name() for system in alone}
+    assert named == {"plant", "controller", "distributor", "cables"}
     assert np.any(log["slack"])  # the least tensions of a planar robot have cables at zero
-
-
-def test_a_diagram_without_a_log_has_four_systems():
-    systems = there_and_back("acrobot_large").diagram.GetSystems()
-    names = {system.get_name() for system in systems}
-    assert names == {"plant", "controller", "distributor", "cables"}
-
-
-def test_a_trajectory_that_cannot_be_held_is_counted():
-    control = there_and_back("acrobot_large", limits=(0.0, 5.3))
-    context, _ = advance(control, 0.4)
-    assert failures(control, context) > 0.0
 
 
 SAMPLED = 4e-4
@@ -234,14 +223,12 @@ def test_a_log_is_read_in_pieces_and_one_call_is_many():
 
 def test_a_loop_starts_at_a_given_pose():
     built = moving()
-    start = built.trajectory.pose(0.0)
-    start.set_translation(start.translation() + np.array([0.01, -0.02, 0.0]))
+    start = RigidTransform([0.01, -0.02, 0.0]) @ built.trajectory.pose(0.0)
     loop = TensionLoop(built, 100.0, start)
     assert loop.errors()[0] == pytest.approx(np.hypot(0.01, 0.02))
     loop.advance_to(0.05)
-    columns, log = loop.columns(), loop.read_log()
-    np.testing.assert_array_equal(columns["tensions"], log["tensions"])
-    np.testing.assert_allclose(log["X_WP"][0, 4:], start.translation(), atol=SAME)
+    np.testing.assert_array_equal(loop.columns()["tensions"], loop.read_log()["tensions"])
+    np.testing.assert_allclose(loop.read_log()["X_WP"][0, 4:], start.translation(), atol=SAME)
 
 
 def test_mujoco_and_daqp_close_the_same_loop():

@@ -21,9 +21,7 @@ from cdpr_drake.systems.controllers.correction_laws import (
 )
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.tension_management import automatic_gain
-from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.tensions.correction_gain import tension_gain
 from cdpr_drake.tensions.slack_correction import TensionFollower
@@ -60,7 +58,7 @@ def test_slack_of_4_cm_goes_in_the_published_time(with_correction, without):
         assert first_taut(without, cable) > 2.0
 
 
-def test_a_log_has_the_corrections_of_the_law(with_correction):
+def test_a_log_has_the_corrections_of_the_law(with_correction, without):
     """Ideal sensors, sampled at 25 Hz: the correction of a row is that of the tensions before."""
     log = with_correction.log
     rows = np.flatnonzero(np.isclose(log["time"] % 0.04, 0.02))
@@ -70,9 +68,7 @@ def test_a_log_has_the_corrections_of_the_law(with_correction):
     assert np.min(added) == pytest.approx(-0.04)  # a slack cable: k_c times the threshold
     expected = -0.04 * np.maximum(1.0 - log["tensions"][rows - 1], 0.0)
     np.testing.assert_allclose(added, expected, atol=1e-12)
-
-
-def test_the_servo_itself_is_not_changed(with_correction, without):
+    # The servo itself is not changed.
     first = [run.log["cable_velocities"][1] for run in (with_correction, without)]
     np.testing.assert_allclose(*first, rtol=0.0, atol=1e-14)
 
@@ -100,16 +96,7 @@ def test_stability_along_a_run_is_that_at_its_poses(without):
     assert again == (along.rank[row], along.margin[row])
 
 
-def test_a_perfect_belief_has_the_margin_one():
-    servo = build_visual_servo(load("perturbations.slack=null", "cables.pulleys=false"))
-    X_WP, criterion = servo.scenario.initial_pose.transform(), criterion_of(servo, False)
-    for taut in (np.ones(8, bool), np.arange(8) != 3, np.arange(8) > 1):
-        rank, margin = criterion.at(X_WP, X_WP, taut, 0.0)
-        assert rank == 6
-        assert margin == pytest.approx(1.0, abs=1e-9)
-    assert criterion.at(X_WP, X_WP, np.arange(8) > 2, 0.0) == (5, 0.0)
-    assert criterion.at(X_WP, X_WP, np.zeros(8, bool), 0.0) == (0, 0.0)
-
+WINCHES = "winches={kind: motor, mode: position}"
 
 KINDS = [
     "{kind: adaptive, gain_per_length: 4}",
@@ -118,12 +105,14 @@ KINDS = [
     "{kind: length}",
     "{kind: polygon, margin: 2, gain: 0.02}",
     "{rate: 100, gain: 0.04}",
+    "{kind: constant, gain: 0.04}",  # of winches that are commanded by position
 ]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_runs_and_takes_up_slack(kind):
-    log = ServoRun(load("duration=2.5", ENGINE, f"tension_management={kind}")).simulate().log
+    changes = [f"tension_management={kind}", *[WINCHES] * ("constant" in kind)]
+    log = ServoRun(load("duration=2.5", ENGINE, *changes)).simulate().log
     surplus = log["unstrained_lengths"][:, :2] - log["lengths"][:, :2]
     assert np.all(surplus[-1] < 0.5 * surplus[0])
     assert np.all(np.isfinite(log["tension_corrections"]))
@@ -175,12 +164,6 @@ def test_a_summary_has_the_automatic_gain(loop):
     np.testing.assert_allclose(shares, shares[0], rtol=1e-9)
     stated = ServoRun(load("tension_management={gain: 0.04}", *shared)).simulate()
     assert "tension_gain" not in stated.as_dict()
-
-
-def test_winches_commanded_by_position_get_the_correction():
-    winches = "winches={kind: motor, mode: position}"
-    log = ServoRun(load("duration=1.5", ENGINE, winches, "sensors.tension=ideal")).simulate().log
-    assert np.all(log["unstrained_lengths"][-1, :2] < log["unstrained_lengths"][0, :2] - 0.03)
 
 
 SLACK, ALLOWANCE = 0.04, 0.002
@@ -237,9 +220,9 @@ def polygon(lower=1.0, fastest=0.1):
 
 
 def test_a_law_without_an_answer_adds_nothing_and_says_so():
-    law = FollowedDistribution(
-        ROBOT, CABLES.without_pulleys(), 0.5, 60.0, "quadratic_program", TensionFollower(0.01, 0.1)
-    )
+    follower = TensionFollower(0.01, 0.1)
+    straight = CABLES.without_pulleys()
+    law = FollowedDistribution(ROBOT, straight, 0.5, 60.0, "quadratic_program", follower)
     memory = np.zeros(law.memory)
     memory[:8] = 1.0
     added, thresholds, could = law.step(readings(np.zeros(8), np.ones(8), OUTSIDE), memory)
@@ -247,13 +230,11 @@ def test_a_law_without_an_answer_adds_nothing_and_says_so():
     assert np.all(added == 0.0)
     assert np.all(thresholds == 0.5)
     assert np.all(memory[:8] == 1.0)
-
-
-@pytest.mark.parametrize(("lower", "X_WP"), [(0.5, OUTSIDE), (30.0, HOME)])
-def test_an_empty_polygon_adds_nothing_and_says_so(lower, X_WP):
-    added, _, could = polygon(lower).step(readings(np.zeros(8), np.ones(8), X_WP), np.zeros(0))
-    assert not could
-    assert np.all(added == 0.0)
+    for lower, X_WP in ((0.5, OUTSIDE), (30.0, HOME)):  # an empty polygon
+        now = readings(np.zeros(8), np.ones(8), X_WP)
+        added, _, could = polygon(lower).step(now, np.zeros(0))
+        assert not could
+        assert np.all(added == 0.0)
 
 
 def test_a_polygon_correction_is_slowed_down_as_a_whole():

@@ -17,9 +17,9 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.cable_robot import automatic_step
 from tests.systems.diagrams.diagram_cases import ENGINE, KNOWN_TAG, LOOP, PROJECTED, servo_run
 
-REACHED = {"acrobot_pbvs": 0.5e-3, "caroca_pbvs": 1.5e-3, "planar_pbvs": 1.5e-3}
-"""True distance from the desired pose at the end of a run [m]: stop rules ask for 0.3 mm and 1 mm
-measured, and the pixel noise of 0.1 px adds to it. Eight seeds of ACROBOT end within 0.12 mm."""
+REACHED = 0.5e-3
+"""True distance from the desired pose at the end of a run [m]: stop rules ask for 0.3 mm measured,
+and the pixel noise of 0.1 px adds to it. Eight seeds end within 0.12 mm."""
 
 REACHED_ANGLE = np.radians(0.5)
 """True angle at the end, that of ACROBOT's stop rule."""
@@ -40,16 +40,11 @@ def systems(servo):
     return {system.get_name() for system in servo.diagram.GetSystems()}
 
 
-def arrives(result, name):
+def arrives(result):
     assert result.outcome == Outcome.CONVERGED
     distance, angle = result.end_error()
-    assert distance < REACHED[name]
+    assert distance < REACHED
     assert angle < REACHED_ANGLE
-
-
-@pytest.fixture(scope="module")
-def acrobot_run():
-    return servo_run("acrobot_pbvs")
 
 
 def test_subsystems_and_ports_are_public():
@@ -66,22 +61,15 @@ def test_subsystems_and_ports_are_public():
         "cable_velocities": 8, "platform_velocity": 6, "error": 6, "gain": 1, "outcome": 1,
         "X_WP_estimated": 0,
     }  # fmt: skip
-
-
-def test_a_rendered_camera_brings_a_detector():
-    servo = build_visual_servo(load_scenario("acrobot_pbvs"))
+    servo = build_visual_servo(load_scenario("acrobot_pbvs"))  # a rendered camera has a detector
     assert {"robot", "camera", "detector", "servo", "estimator", "monitor"} <= systems(servo)
     assert servo.cable_robot.scene_graph.RendererCount() == 1
 
 
-@pytest.mark.parametrize("name", ["caroca_pbvs", "planar_pbvs"])
-def test_the_other_robots_converge(name):
-    arrives(servo_run(name, *LOOP), name)
-
-
-def test_acrobot_converges_and_its_log_tells_the_run(acrobot_run):
-    arrives(acrobot_run, "acrobot_pbvs")
-    servo, log = acrobot_run.built, acrobot_run.log
+def test_a_run_converges_and_its_log_tells_it():
+    run = servo_run("acrobot_pbvs")
+    arrives(run)
+    servo, log = run.built, run.log
     rows = len(log["time"])
     assert {name: values.shape for name, values in log.items()} == {
         "time": (rows,), "X_WP": (rows, 7), "X_WP_estimated": (rows, 7),
@@ -91,20 +79,17 @@ def test_acrobot_converges_and_its_log_tells_the_run(acrobot_run):
         "unstrained_lengths": (rows, 8), "slack": (rows, 8), "surplus_lengths": (rows, 8),
     }  # fmt: skip
     np.testing.assert_allclose(log["time"], np.arange(rows) / servo.scenario.log_rate)
-    rest = acrobot_run.sim_time - log["time"][-1]
+    rest = run.sim_time - log["time"][-1]
     assert rest < 1.0 / servo.scenario.log_rate + ROUND_OFF
     start = pose_from_row(log["X_WP"][0])
     assert max(pose_error(servo.scenario.initial_pose.transform(), start)) < ROUND_OFF
     end = pose_from_row(log["X_WP"][-1])
-    assert pose_error(end, servo.desired_platform_pose())[0] < REACHED["acrobot_pbvs"]
+    assert pose_error(end, servo.desired_platform_pose())[0] < REACHED
     assert np.all(log["tensions"] >= 0.0)
     np.testing.assert_array_equal(log["slack"], log["tensions"] == 0.0)
     error = np.linalg.norm(log["error"], axis=1)
     assert error[-1] < 0.05 * np.max(error)
-
-
-def test_control_integration_follows_a_robot_without_model_errors(acrobot_run):
-    log = acrobot_run.log
+    # Control integration follows a robot without model errors.
     distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_estimated"])
     assert np.max(distance) < ESTIMATE[0]
     assert np.max(angle) < ESTIMATE[1]
@@ -134,7 +119,7 @@ def test_a_servo_converges_with_a_wrong_model_and_late_images(change):
     if "latency" in change:
         assert result.outcome == Outcome.CONVERGED
     else:
-        arrives(result, "acrobot_pbvs")
+        arrives(result)
 
 
 def test_a_target_out_of_view_ends_the_run():
@@ -192,6 +177,8 @@ def test_shifted_is_what_is_measured_off_by_the_error_of_the_start():
     distance, angle = pose_rows_distance(log["X_WP_measured"], log["X_WP_shifted"])
     np.testing.assert_allclose(distance, 0.03, atol=ROUND_OFF)
     np.testing.assert_allclose(angle, np.radians(4.0), atol=1e-7)  # an angle by its cosine
+    shifts = log["X_WP_shifted"][:, 4:] - log["X_WP_measured"][:, 4:]
+    np.testing.assert_allclose(shifts, np.tile(shifts[0], (len(shifts), 1)), atol=ROUND_OFF)
 
 
 @pytest.mark.parametrize("kind", ["control_integration", "cable_lengths", "fusion", "measured"])
@@ -207,21 +194,17 @@ def test_the_servo_uses_the_named_estimator_which_follows_beside_a_moving_target
     assert np.max(distance[1:]) < CLOSE
 
 
-def test_comparing_changes_nothing():
-    """What runs beside the estimator has no effect on the run."""
+def test_what_runs_beside_the_estimator_changes_nothing_but_brings_its_sensors():
+    names = {"tension_sensors", "encoders", "tracker"}
+    types = ("sensors.tension=vlu850", "sensors.encoder=servo_encoder")
     _, alone = look()
     _, beside = look("estimator.compare=[fusion, cable_lengths, first_image]")
     for name in ("X_WP", "cable_velocities"):
         np.testing.assert_array_equal(alone[name], beside[name])
-
-
-def test_sensors_are_there_if_an_estimator_reads_them():
-    types, names = ("sensors.tension=vlu850", "sensors.encoder=servo_encoder"), (
-        "tension_sensors", "encoders", "tracker")  # fmt: skip
-    assert not set(names) & systems(built("acrobot_pbvs", *types))
+    assert not names & systems(built("acrobot_pbvs", *types))
     compared = "estimator.compare=[cable_lengths, fusion, measured, cable_lengths_elastic]"
     servo, log = look(*types, compared)
-    assert set(names) <= systems(servo)
+    assert names <= systems(servo)
     distance, _ = pose_rows_distance(log["X_WP"], log["X_WP_cable_lengths_elastic"])
     assert 0.0 < np.max(distance[1:]) < CLOSE
 
@@ -250,18 +233,17 @@ def fused_run(*changes):
     return ServoRun(load_scenario("acrobot_fusion", [*shared, *changes])).simulate().log
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["as commanded", "by IMU"])
-def covered(request):
+IMU = ["sensors.imu={type: adis16448}", f"{FUSION}.imu=true"]
+
+
+@pytest.mark.parametrize("imu", [[], IMU], ids=["as commanded", "by IMU"])
+def test_a_fused_pose_says_what_it_used_and_leads_on_while_a_camera_is_covered(imu):
     """The camera on board is covered from the third image on; all other sources are there."""
-    imu = ["sensors.imu={type: adis16448}", f"{FUSION}.imu=true"] if request.param else []
-    return fused_run(
+    covered = fused_run(
         "estimator.compare=[control_integration]", f"{FUSION}.external_depth=kinect",
         "camera.fault={kind: dead, start: 0.08, duration: 9}", f"{FUSION}.on_board_depth=ideal",
         *imu,
     )  # fmt: skip
-
-
-def test_a_fused_pose_says_which_sources_it_used(covered):
     sources = covered["fusion_sources"]
     assert sources.shape[1] == 5
     on_board, external, lengths, _, depth = sources[2:].T
@@ -272,18 +254,14 @@ def test_a_fused_pose_says_which_sources_it_used(covered):
     assert np.nanmean(covered["fusion_nis"][2:, 1]) < 3.0
     deviations = np.sqrt(np.diagonal(covered["fusion_covariance"][2:].reshape(-1, 6, 6), 0, 1, 2))
     assert np.all((deviations > 1e-5) & (deviations < 0.05))
-
-
-def test_a_servo_goes_on_better_than_by_commands_while_its_camera_is_covered(covered):
+    # The servo goes on, better than by commands.
     assert not np.any(covered["found"][4:])
     speed = np.linalg.norm(covered["platform_velocity"][5:, 3:], axis=1)
     assert np.min(speed) > 0.01
     fused, _ = pose_rows_distance(covered["X_WP"], covered["X_WP_estimated"])
     commanded, _ = pose_rows_distance(covered["X_WP"], covered["X_WP_control_integration"])
     assert np.mean(fused[5:]) < np.mean(commanded[5:])
-
-
-def test_without_doubt_a_run_says_how_a_calibration_fits(covered):
+    # Without doubt a run says how a calibration fits.
     found = found_calibrations(covered["fusion_calibration"][-1])
     assert {each["probability_worse"] for each in found.values()} == {None}
     assert all(each["judged"] in ("as told", "nothing learnt") for each in found.values())

@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
@@ -15,7 +15,7 @@ from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import exponential, pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.estimators.basic_estimators import ControlIntegration, ShiftedPose
+from cdpr_drake.systems.estimators.basic_estimators import ControlIntegration
 from cdpr_drake.systems.estimators.image_estimators import (
     ConsecutiveImages,
     FirstImage,
@@ -51,52 +51,25 @@ ROBOT = load_robot("acrobot_small")
 CABLES = ROBOT.cable_set().without_pulleys()
 
 
-PORTS = {
-    "control": (ControlIntegration(START, RATE), {"platform_velocity": 6}),
-    "consecutive": (ConsecutiveImages(START, X_PC, RATE), {"X_CO": 0, "found": 1}),
-    "first": (FirstImage(START, X_PC, RATE), {"X_CO": 0, "found": 1}),
-    "lengths": (
-        LengthEstimator(START, EncoderLengths(CABLES, True), RATE),
-        {"measured_lengths": 8, "measured_tensions": 8},
-    ),
-    "shifted": (ShiftedPose(START, WRONG), {"X_WP_measured": 0}),
-}
-
-
-@pytest.mark.parametrize("name", PORTS)
-def test_ports_of_an_estimator_are_public(name):
-    estimator, expected = PORTS[name]
-    inputs = [estimator.get_input_port(i) for i in range(estimator.num_input_ports())]
-    assert {port.get_name(): port.size() for port in inputs} == expected
-    assert estimator.num_output_ports() == 1
-    assert isinstance(estimator.GetOutputPort("X_WP").Allocate().get_value(), RigidTransform)
-
-
-def integrated(time, rate=RATE):
-    """The pose of control integration with a constant twist."""
+@pytest.mark.parametrize(
+    ("time", "rate", "close"),
+    [
+        *((periods * PERIOD, RATE, ROUND_OFF) for periods in (0.0, 0.3, 1.0, 1.7, 12.9)),
+        (0.5, 1e4, 1e3 * ROUND_OFF),  # thousands of products, which would each add their round-off
+    ],
+)
+def test_a_constant_twist_is_integrated_exactly_and_a_rotation_stays_one(time, rate, close):
+    """At updates and between them, X_WP(t) = X_WP(0) exp(V t)."""
     estimator = ControlIntegration(START, rate)
     simulator = Simulator(estimator)
     context = simulator.get_mutable_context()
     estimator.GetInputPort("platform_velocity").FixValue(context, TWIST)
     if time:
         simulator.AdvanceTo(time)
-    return RigidTransform(estimator.GetOutputPort("X_WP").Eval(context))
-
-
-@pytest.mark.parametrize("periods", [0.0, 0.3, 1.0, 1.7, 10.0, 12.9])
-def test_a_constant_twist_is_integrated_exactly(periods):
-    """At updates and between them, X_WP(t) = X_WP(0) exp(V t)."""
-    time = periods * PERIOD
-    expected = START @ exponential(TWIST * time)
-    assert max(pose_error(expected, integrated(time))) < ROUND_OFF
-
-
-def test_an_integrated_rotation_stays_a_rotation():
-    """After thousands of products, which would each add their round-off."""
-    found = integrated(0.5, 1e4)
-    R = found.rotation().matrix()
+    X_WP = RigidTransform(estimator.GetOutputPort("X_WP").Eval(context))
+    assert max(pose_error(START @ exponential(TWIST * time), X_WP)) < close
+    R = X_WP.rotation().matrix()
     np.testing.assert_allclose(R.T @ R, np.eye(3), atol=ROUND_OFF)
-    assert max(pose_error(START @ exponential(TWIST * 0.5), found)) < 1e3 * ROUND_OFF
 
 
 class Source(LeafSystem):
@@ -136,21 +109,6 @@ def test_control_integration_does_not_lag_behind_a_controller_that_updates_at_th
             expected = X_WP @ exponential(twist * share * PERIOD)
             assert max(pose_error(expected, found)) < ROUND_OFF
         X_WP = X_WP @ exponential(twist * PERIOD)
-
-
-def test_the_error_of_a_shifted_pose_is_the_same_everywhere():
-    start = RigidTransform(RotationMatrix.MakeXRotation(0.4), [1.0, 0.0, 0.5])
-    turn = RotationMatrix.MakeZRotation(0.1)
-    system = ShiftedPose(start, RigidTransform(start.rotation() @ turn, [1.0, 0.03, 0.5]))
-    context = system.CreateDefaultContext()
-    for angle in (0.0, 0.4, 1.3):
-        X_WP = RigidTransform(RotationMatrix.MakeXRotation(angle), [angle, 2.0, 0.5])
-        system.get_input_port().FixValue(context, X_WP)
-        found = system.get_output_port().Eval(context)
-        shift = found.translation() - X_WP.translation()
-        np.testing.assert_allclose(shift, [0.0, 0.03, 0.0], atol=ROUND_OFF)
-        error = X_WP.rotation().inverse() @ found.rotation()
-        np.testing.assert_allclose(error.matrix(), turn.matrix(), atol=ROUND_OFF)
 
 
 def path(count, seed=2):
@@ -205,27 +163,19 @@ def test_noise_does_not_add_up_from_image_to_image():
 
 
 @BOTH
-def test_a_known_tag_begins_an_estimate_anew_after_each_period(kind):
-    period = 5.0 * PERIOD
-    bench = EstimatorBench(kind(WRONG, X_PC, RATE, KnownTag(X_WK, X_PC, period)))
-    for k, X_WP in enumerate(path(20)):
-        found = bench.step(**image(X_WP), **known(X_WP))
-        expected = X_WP if k >= 5 else WRONG @ START.inverse() @ X_WP
-        assert max(pose_error(found, expected)) < IMAGES
-
-
-@BOTH
-def test_a_known_tag_that_shows_up_late_is_used_then(kind):
-    bench = EstimatorBench(kind(WRONG, X_PC, RATE, KnownTag(X_WK, X_PC, 2.0 * PERIOD)))
-    for k, X_WP in enumerate(path(12)):
+@pytest.mark.parametrize(("period", "late"), [(5.0, None), (2.0, 7)])
+def test_a_known_tag_begins_an_estimate_anew_after_each_period_or_when_it_shows_up(
+    kind, period, late
+):
+    """The late one is seen once, at a step without the target: what follows is told from 8 on."""
+    bench = EstimatorBench(kind(WRONG, X_PC, RATE, KnownTag(X_WK, X_PC, period * PERIOD)))
+    for k, X_WP in enumerate(path(late + 1 if late else 20)):
+        with_tag = late is None or k == late
         found = bench.step(
-            **(NO_IMAGE if k == 7 else image(X_WP)), **(known(X_WP) if k == 7 else NO_TAG)
+            **(NO_IMAGE if k == late else image(X_WP)), **(known(X_WP) if with_tag else NO_TAG)
         )
-        if k < 7:
-            assert pose_error(found, X_WP)[0] > 1e-2
-        else:
-            # At 7 the target itself is not seen: what follows is told from 8 on.
-            assert k != 7 or max(pose_error(found, X_WP)) < IMAGES
+        expected = X_WP if k >= (late or period) else WRONG @ START.inverse() @ X_WP
+        assert max(pose_error(found, expected)) < IMAGES
 
 
 def test_the_known_object_tells_the_pose_whatever_was_believed():
@@ -241,39 +191,34 @@ TENSIONS = np.array([40.0, 55.0, 60.0, 35.0, 10.0, 20.0, 5.0, 1.0])
 
 
 @cache
-def robot_way(name):
+def robot_way(name="acrobot_small"):
+    """A robot and a way from its home, at the period of control."""
     robot = load_robot(name)
-    home = robot.home.transform()
-    planar = robot.is_planar()
+    home, planar = robot.home.transform(), robot.is_planar()
     step = np.array([0, 0, 0.3, 0.15, -0.1, 0] if planar else [0.1, -0.2, 0.3, 0.15, -0.1, 0.1])
     way = PoseTrajectory((home, home @ exponential(step)), (1.0,))
     return robot, [way.pose(k * PERIOD) for k in range(26)]
 
 
-def counted(cables, X_WP, tensions, elastic, zero):
-    """What encoders would say that started at zero where they started."""
+def counted(cables, X_WP, tensions=TENSIONS, elastic=False, zero=0.3):
+    """What encoders read that were zero at a length [m], and tensions."""
     lengths = cable_paths(X_WP, cables).lengths
     if elastic:
         lengths = unstrained_lengths(lengths, tensions, cables.stiffness)
-    return lengths - zero
+    return {"measured_lengths": lengths - zero, "measured_tensions": tensions}
 
 
-def run(robot, poses, truth, model, start=None):
+def bench_of(start, cables=CABLES, elastic=False, **options):
+    return EstimatorBench(LengthEstimator(start, EncoderLengths(cables, elastic), RATE, **options))
+
+
+def run(robot, poses, truth, model):
     """Errors [m] along a way, with (cables, elastic) of the truth and of the model."""
-    m = robot.cable_set().count
-    estimator = LengthEstimator(
-        start or poses[0], EncoderLengths(*model), RATE, robot.motion_type()
-    )
-    bench = EstimatorBench(estimator)
-    errors = []
-    for k, X_WP in enumerate(poses):
-        tensions = TENSIONS[:m] * (1.0 + 0.02 * k)
-        found = bench.step(
-            measured_lengths=counted(truth[0], X_WP, tensions, truth[1], 0.3),
-            measured_tensions=tensions,
-        )
-        errors.append(pose_error(found, X_WP))
-    return np.array(errors)
+    bench, m = bench_of(poses[0], *model, motion=robot.motion_type()), len(robot.cables)
+    return np.array([
+        pose_error(bench.step(**counted(truth[0], X, TENSIONS[:m] * (1.0 + 0.02 * k), truth[1])), X)
+        for k, X in enumerate(poses)
+    ])  # fmt: skip
 
 
 @pytest.mark.parametrize("pulleys", [False, True])
@@ -296,67 +241,53 @@ def test_a_model_is_wrong_on_the_way_but_not_at_the_start_by_what_it_leaves_out(
 
 
 def test_only_the_tautest_cables_count():
-    _, poses = robot_way("acrobot_small")
-    bench = EstimatorBench(LengthEstimator(poses[0], EncoderLengths(CABLES, False), RATE))
+    _, poses = robot_way()
+    bench = bench_of(poses[0])
     for k, X_WP in enumerate(poses):
-        lengths = counted(CABLES, X_WP, TENSIONS, False, 0.0)
-        lengths[6:] += 0.05 if k else 0.0  # slack in the two that pull least
-        found = bench.step(measured_lengths=lengths, measured_tensions=TENSIONS)
-        assert max(pose_error(found, X_WP)) < EXACT
+        read = counted(CABLES, X_WP)
+        read["measured_lengths"][6:] += 0.05 if k else 0.0  # slack in the two that pull least
+        assert max(pose_error(bench.step(**read), X_WP)) < EXACT
 
 
 def test_a_start_from_a_wrong_pose_stays_wrong_and_jumps_where_the_cables_change():
     """The reference lengths are those of the wrong pose: each six of them tell another pose."""
-    _, poses = robot_way("acrobot_small")
-    wrong = poses[0] @ exponential(np.array([0.05, 0.02, -0.05, 0.02, -0.02, 0.02]))
-    bench = EstimatorBench(LengthEstimator(wrong, EncoderLengths(CABLES, False), RATE))
-    found = []
+    _, poses = robot_way()
+    bench = bench_of(poses[0] @ exponential(np.array([0.05, 0.02, -0.05, 0.02, -0.02, 0.02])))
+    error = []
     for k, X_WP in enumerate(poses):
         # Half-way slack moves from the last two cables to the first two.
         tensions = TENSIONS if k < 13 else TENSIONS[::-1].copy()
-        lengths = counted(CABLES, X_WP, tensions, False, 0.0)
-        found.append(bench.step(measured_lengths=lengths, measured_tensions=tensions))
-    error = np.array([X.translation() - Y.translation() for X, Y in zip(found, poses, strict=True)])
+        found = bench.step(**counted(CABLES, X_WP, tensions))
+        error.append(found.translation() - X_WP.translation())
     steps = np.linalg.norm(np.diff(error, axis=0), axis=1)
     assert np.linalg.norm(error[-1]) > 0.01
     assert steps[12] > 3.0 * np.max(np.delete(steps, 12))
 
 
 def test_where_no_pose_has_the_lengths_the_last_one_stays():
-    _, poses = robot_way("acrobot_small")
-    bench = EstimatorBench(LengthEstimator(poses[0], EncoderLengths(CABLES, False), RATE))
-    lengths = counted(CABLES, poses[0], TENSIONS, False, 0.0)
-    bench.step(measured_lengths=lengths, measured_tensions=TENSIONS)
-    impossible = lengths * np.array([0.3, 1, 0.3, 1, 0.3, 1, 1, 1])
-    found = bench.step(measured_lengths=impossible, measured_tensions=TENSIONS)
-    assert max(pose_error(found, poses[0])) < EXACT
-    found = bench.step(measured_lengths=lengths, measured_tensions=TENSIONS)
-    assert max(pose_error(found, poses[0])) < EXACT
+    start = robot_way()[1][0]
+    bench, read = bench_of(start), counted(CABLES, start, zero=0.0)
+    bench.step(**read)
+    shorter = read["measured_lengths"] * np.array([0.3, 1, 0.3, 1, 0.3, 1, 1, 1])
+    for lengths in (shorter, read["measured_lengths"]):
+        found = bench.step(**{**read, "measured_lengths": lengths})
+        assert max(pose_error(found, start)) < EXACT
 
 
 def test_a_known_tag_corrects_the_reference_too():
-    _, poses = robot_way("acrobot_small")
+    _, poses = robot_way()
     wrong = poses[0] @ exponential(np.array([0.03, 0.0, 0.0, 0.02, 0.0, 0.0]))
-    estimator = LengthEstimator(
-        wrong, EncoderLengths(CABLES, False), RATE, known_tag=KnownTag(X_WK, X_PC, 4.0 * PERIOD)
-    )
-    bench = EstimatorBench(estimator)
+    bench = bench_of(wrong, known_tag=KnownTag(X_WK, X_PC, 4.0 * PERIOD))
     for k, X_WP in enumerate(poses):
-        found = bench.step(
-            measured_lengths=counted(CABLES, X_WP, TENSIONS, False, 0.3),
-            measured_tensions=TENSIONS,
-            X_CK=(X_WP @ X_PC).inverse() @ X_WK,
-            # Seen once: what follows is told by the lengths alone.
-            known_tag_found=[float(k == 5)],
-        )
-        error = max(pose_error(found, X_WP))
+        # Seen once: what follows is told by the lengths alone.
+        seen = {**known(X_WP), "known_tag_found": [float(k == 5)]}
+        error = max(pose_error(bench.step(**counted(CABLES, X_WP), **seen), X_WP))
         assert error < EXACT if k >= 5 else error > LARGE
 
 
 def test_readings_below_zero_do_not_shorten_cables():
     cables, pose = ROBOT.cable_set(), ROBOT.home.transform()
-    counting = EncoderLengths(cables, True)
-    below = np.full(8, -3.0)
+    counting, below = EncoderLengths(cables, True), np.full(8, -3.0)
     reference = counting.reference(pose, np.zeros(8), below)
     np.testing.assert_array_equal(reference, cable_paths(pose, cables).lengths)
     np.testing.assert_array_equal(counting.lengths(np.zeros(8), reference, below), reference)

@@ -70,7 +70,9 @@ def test_what_only_a_diagram_can_do_is_said(overrides, reason):
 @pytest.mark.parametrize("choice", ["integration.engine=plant", "integration.loop=diagram"])
 def test_what_is_asked_for_is_left(choice):
     scenario = load_scenario("acrobot_pbvs", [PROJECTED, choice])
-    assert not uses_compiled_loop(set_loop(scenario, repeated=True)[0])
+    chosen, words = set_loop(scenario, repeated=True)
+    assert not uses_compiled_loop(chosen)
+    assert (words == "") == ("plant" in choice)
     assert not uses_compiled_loop(choose_compiled_loop(scenario))
 
 

@@ -6,7 +6,6 @@ import pytest
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
-from cdpr_drake.systems.loops.loop_state import Clock, next_time
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 ROUNDING = 1e-15
@@ -84,26 +83,15 @@ def test_catenaries_differ_by_what_their_search_leaves():
     assert np.max(np.abs(diagram.log["tensions"] - loop.log["tensions"])) < CATENARY_TENSION
 
 
-def test_a_run_that_converges_ends_at_the_same_time():
-    diagram, loop = both("acrobot_pbvs", duration=20.0)
-    assert diagram.outcome == Outcome.CONVERGED
+@pytest.mark.parametrize(
+    ("changes", "duration", "outcome"),
+    [
+        ((), 20.0, Outcome.CONVERGED),
+        (("target.motion={velocity: [1.0, 0, 0]}", "stop.target_lost=0.1"), 2.0,
+         Outcome.TARGET_LOST),
+    ],
+)  # fmt: skip
+def test_a_run_ends_at_the_same_time(changes, duration, outcome):
+    diagram, loop = both("acrobot_pbvs", *changes, duration=duration)
+    assert diagram.outcome == outcome
     same(diagram, loop)
-
-
-def test_a_lost_target_ends_at_the_same_time():
-    away = "target.motion={velocity: [1.0, 0, 0]}"
-    diagram, loop = both("acrobot_pbvs", away, "stop.target_lost=0.1", duration=2.0)
-    assert diagram.outcome == Outcome.TARGET_LOST
-    same(diagram, loop)
-
-
-def test_clocks_strike_at_drake_s_times():
-    """Multiples of a period, not sums of it."""
-    clock, now, struck = Clock(0.1), 0.0, []
-    for _ in range(8):
-        assert clock.strikes(now)
-        struck.append(now)
-        now = clock.next
-    assert struck == [k * 0.1 for k in range(8)]
-    assert next_time(0.25, 0.1) == 3 * 0.1
-    assert not clock.strikes(0.75)

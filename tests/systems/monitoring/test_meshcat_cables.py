@@ -89,11 +89,7 @@ def test_slack_is_level_zero_colours_rise_and_unknown_tension_is_grey(pictures, 
     for tensions, levels in ((few, (0, 1, 2, 4, 5, 8, 8, 8)), (np.zeros(8), (0,) * 8)):
         pictures.draw(HOME, tensions)
         assert [meshcat.shown(name) for name in NAMES] == [(1, level) for level in levels]
-
-
-def test_a_rod_reaches_from_exit_to_anchor_point(pictures, meshcat):
-    pictures.draw(HOME, np.ones(8))
-    for cable in ROBOT.cables:
+    for cable in ROBOT.cables:  # a rod reaches from exit to anchor point
         ends = cable.exit_point, HOME.multiply(cable.anchor_point)
         np.testing.assert_allclose(meshcat.points(cable.name)[0], ends, atol=ROUNDING)
 
@@ -127,14 +123,9 @@ def test_catenaries_sag_and_keep_the_colour_of_their_tension(meshcat):
             np.testing.assert_allclose(start, cable.exit_point, atol=ROUNDING)
 
 
-def test_a_chain_made_during_a_recording_is_hidden_before(pictures, meshcat):
-    pictures.draw(HOME, np.full(8, 0.8), 0.0)
-    pictures.draw(HOME, np.full(8, 9.0), 1.0)
-    assert meshcat.visible["cables/C1/1/1"] == [(None, False), (0.0, True), (1.0, False)]
-    assert meshcat.visible["cables/C1/1/8"] == [(None, False), (0.0, False), (1.0, True)]
-
-
-def test_a_recording_keeps_what_moves_and_when_it_began_to(pictures, meshcat):
+def test_a_recording_keeps_what_moves_when_it_began_to_and_hides_a_chain_before_it_is_made(
+    pictures, meshcat
+):
     for time in (0.0, 1.0, 2.0):
         pictures.draw(HOME, np.full(8, 0.8), time)
     assert meshcat.times["cables/C1/1/1/0"] == [0.0]
@@ -143,6 +134,9 @@ def test_a_recording_keeps_what_moves_and_when_it_began_to(pictures, meshcat):
     assert meshcat.times["cables/C1/1/1/0"] == [0.0, 2.0, 3.0]
     anchor = aside.multiply(ROBOT.cables[0].anchor_point)
     np.testing.assert_allclose(meshcat.points("C1")[0, 1], anchor, atol=ROUNDING)
+    pictures.draw(HOME, np.full(8, 9.0), 4.0)
+    assert meshcat.visible["cables/C1/1/1"] == [(None, False), (0.0, True), (4.0, False)]
+    assert meshcat.visible["cables/C1/1/8"] == [(None, False), (0.0, False), (4.0, True)]
 
 
 def test_the_system_draws_while_a_simulation_runs():

@@ -54,6 +54,7 @@ OUTSIDE = (
 
 REFUSED = {
     SERVO: {
+        "stability={threshold: -1}": "stability.threshold: found -1",
         "camera.mount=ceiling": "camera.mount: 'ceiling' is not on the platform",
         "camera.mount=overview": "camera.mount: 'overview' is not on the",
         "initial_pose.position=[0.7, 0.0, 0.3]": OUTSIDE,
@@ -62,6 +63,10 @@ REFUSED = {
         ),
         "desired.position=[0.0, 0.0, 0.0]": "position: found (0, 0, 0); accepted: z > 0 [m]",
         "controller.lambda_infinity=3.0": "lambda_infinity: found 3; accepted: at most lambda_0",
+        "expected.outcome=arrived": "expected.outcome: found arrived; accepted: one of",
+        "integration.integrator=semi_implicit": "found semi_implicit with the engine plant",
+        "integration.accuracy=1e-9": "accuracy: found 1e-09 with the engine plant",
+        "integration.engine=mujoco": "engine: found mujoco; accepted: one of automatic",
         "seed": "overrides seed: accepted: key=value",
         "=1": "overrides =1: accepted: key=value",
         "sead=1": "overrides sead: there is no key sead in the scenario; did you mean seed?",

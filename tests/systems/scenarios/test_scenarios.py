@@ -156,6 +156,8 @@ def test_planar_scenario_stays_in_the_plane():
          "initial_pose.angles_deg", [1.0, 2.0, 3.0]),
         (["perturbations.initial_pose.position=[0.1, 0.0, 0.3]"],  # makes the section
          "perturbations.initial_pose.position", [0.1, 0.0, 0.3]),
+        (["perturbations.initial_pose.position=[0.1, 0.0, 0.3]"],  # with its defaults
+         "perturbations.initial_pose.angles_deg", [0.0, 0.0, 0.0]),
         *(([f"title={words}"], "title", words) for words in ("5", "true", "on", "1.5", "no")),
     ],
 )  # fmt: skip
@@ -169,12 +171,6 @@ def test_overrides_replace_values(overrides, path, value):
 
     assert read(load_scenario("acrobot_pbvs")) != value
     assert read(load_scenario("acrobot_pbvs", overrides)) == value
-
-
-def test_a_section_that_an_override_makes_has_its_defaults():
-    section = ["perturbations.initial_pose.position=[0.1, 0.0, 0.3]"]
-    believed = load_scenario("acrobot_pbvs", section).perturbations.initial_pose
-    np.testing.assert_array_equal(believed.angles_deg, np.zeros(3))
 
 
 # Dynamic control.
@@ -215,18 +211,15 @@ def test_forces_alone_hold_poses_that_no_wrench_holds():
     np.testing.assert_array_equal(scenario.trajectory.start.position, [0.45, 0.45, 0.6])
 
 
-@pytest.mark.parametrize(
-    ("overrides", "real", "believed"),
-    [
-        ([], False, False),
-        (["cables.pulleys=true"], True, True),
-        (["cables.pulleys=true", "distribution.pulleys=false"], True, False),
-    ],
-)
-def test_pulleys_are_simulated_and_believed_in_as_asked(overrides, real, believed):
-    robot, scenario = load_robot("acrobot_large"), load_scenario(TORQUE, overrides)
-    assert scenario.cable_set(robot).has_pulleys() == real
-    assert scenario.believed_cables(robot).has_pulleys() == believed
+def test_pulleys_are_simulated_and_believed_in_as_asked():
+    robot, pulleys = load_robot("acrobot_large"), "cables.pulleys=true"
+    for overrides, real, believed in (
+        ([], False, False), ([pulleys], True, True),
+        ([pulleys, "distribution.pulleys=false"], True, False),
+    ):  # fmt: skip
+        scenario = load_scenario(TORQUE, overrides)
+        assert scenario.cable_set(robot).has_pulleys() == real
+        assert scenario.believed_cables(robot).has_pulleys() == believed
 
 
 # Engines.
@@ -240,13 +233,10 @@ def test_long_and_repeated_runs_take_the_compiled_engine_and_say_so(name):
     for chosen, words in (set_engine(long), set_engine(short, repeated=True)):
         assert engine_of(chosen) == chosen.integration.engine == "compiled"
         assert words.startswith(f"{name}: by the compiled engine")
-
-
-@pytest.mark.parametrize("engine", ["plant", "compiled"])
-def test_what_is_asked_for_is_left(engine):
-    scenario = load_scenario("acrobot_pbvs", ["duration=1e4", f"integration.engine={engine}"])
-    assert set_engine(scenario, repeated=True) == (scenario, "")
-    assert engine_of(scenario) == engine
+    for engine in ("plant", "compiled"):  # what is asked for is left
+        asked = load_scenario(name, ["duration=1e4", f"integration.engine={engine}"])
+        assert set_engine(asked, repeated=True) == (asked, "")
+        assert engine_of(asked) == engine
 
 
 # The scenario that a new user runs: case study I, with cables that stay taut.

@@ -9,7 +9,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from scipy.special import chdtri
 
 from cdpr_drake.calibration.program import CalibrationProgram
-from cdpr_drake.calibration.recursive import (
+from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.systems.estimators.recursive_calibration import (
     TAG,
     UNIT_CAMERA,
     Beforehand,
@@ -17,10 +21,6 @@ from cdpr_drake.calibration.recursive import (
     Look,
     RecursiveCalibration,
 )
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.poses import rotation_from_vector
-from cdpr_drake.models.robot_loader import load_robot
 
 LENGTH, CORNER = 1e-4, 3e-4
 WRONG = 0.01

@@ -12,7 +12,7 @@ from cdpr_drake.analyses.fits.setup import CalibrationTask
 from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+from tests.analyses.verbs.verb_checks import as_json, one_line, shows_itself
 from tests.identification.logs import log as motion_log
 
 

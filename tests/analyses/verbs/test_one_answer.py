@@ -4,7 +4,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.models.robot_loader import load_robot, robot_names
-from tests.analyses.front.one_answer import SAGGING, agreement, answers_at, poses_of
+from tests.analyses.verbs.one_answer import SAGGING, agreement, answers_at, poses_of
 
 
 @pytest.mark.parametrize("name", robot_names())

@@ -1,6 +1,6 @@
 """Can a robot be held at a pose? Asked of every call that can answer it.
 
-`python -m tests.analyses.front.one_answer [--pulleys-ignored]` prints the table of calls and
+`python -m tests.analyses.verbs.one_answer [--pulleys-ignored]` prints the table of calls and
 robots.
 """
 

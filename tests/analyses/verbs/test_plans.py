@@ -12,7 +12,7 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     robot_limits,
 )
 from cdpr_drake.planning.path_timing import plan_along_path
-from tests.analyses.front.front_checks import as_json, one_line, shows_itself
+from tests.analyses.verbs.verb_checks import as_json, one_line, shows_itself
 
 
 def test_a_plan(planar, aside):

@@ -17,7 +17,7 @@ import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.summaries import Summarized
-from tests.analyses.front.front_checks import HOMES, RESULTS, as_json, one_line, shows_itself
+from tests.analyses.verbs.verb_checks import HOMES, RESULTS, as_json, one_line, shows_itself
 
 PROMISED = """
     __version__ load_robot robot_names load_scenario scenario_names Robot Scenario CableSet Pose

@@ -2,7 +2,7 @@
 
 What is learnt are exit points, anchor points and where winches began to count. What an image of a
 tag that rests and the lengths at the same instant tell is a station, with residuals and derivatives
-of `terms` and `sensor_terms`; its pose is eliminated. The stations of a window are linearised
+of the room `calibration`; its pose is eliminated. The stations of a window are linearised
 anew with each that comes, and the oldest goes, as it is linearised then, into an information
 matrix that stays: beyond the window this is the extended information filter, which is then too
 sure of itself, as what is linearised at an early estimate tells of directions that nothing excites.

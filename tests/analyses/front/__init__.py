@@ -1,1 +1,0 @@
-"""Tests of `cdpr_drake.analyses.front`, the verbs of `import cdpr_drake as cdpr`."""
