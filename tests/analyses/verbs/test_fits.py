@@ -76,6 +76,7 @@ def test_an_identification(tmp_path):
     again = fit_dynamics(IdentificationTask(robot=robot, pulleys=False), log)
     np.testing.assert_array_equal([u.value for u in fit.unknowns], again.result.values)
     assert fit.model.platform.mass == again.result.model.mass
+    assert cdpr.ParameterCovariance.of(fit).names == again.result.names
     assert "mass" in shows_itself(fit)
 
 
