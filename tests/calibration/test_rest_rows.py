@@ -13,6 +13,9 @@ STANDS, MOVES, STOPS = 30, 40, 6
 NOISE, TENSION_NOISE, SWING = 5e-4, 0.5, 8.0
 """Of lengths [m] and tensions [N]; and how far tensions swing after a stop [N]."""
 
+CREPT = 4e-3
+"""Largest deviation in a group; the stop creeps by 60 mm [m]."""
+
 EDGE = 4
 """Rows at the ends of a stop that a window cannot tell from motion."""
 
@@ -99,3 +102,32 @@ def test_a_gap_parts_two_stops():
     found = rows_at_rest(time, [lengths], tensions)
     assert len(found.groups) == STOPS
     assert all(group.start // STANDS == (group.stop - 1) // STANDS for group in found.groups)
+
+
+def test_rows_on_both_sides_of_a_gap_are_two_groups():
+    _, lengths, tensions, _ = recorded()
+    lengths, tensions = (np.vstack([rows[:STANDS], rows]) for rows in (lengths, tensions))
+    numbers = np.arange(len(lengths))
+    found = rows_at_rest(0.1 * numbers + 60.0 * (numbers >= STANDS), [lengths], tensions)
+    assert len(found.groups) == STOPS + 1
+    assert found.groups[0].stop <= STANDS <= found.groups[1].start
+
+
+def test_an_angle_that_swings_on_standing_winches_is_no_rest():
+    time, lengths, _, _ = recorded()
+    angles = lengths - 1.5
+    stop = slice(STANDS + MOVES, 2 * STANDS + MOVES)
+    angles[stop] += 0.02 * np.sin(9.0 * time[stop])[:, None]  # rates of a window are small
+    found = rows_at_rest(time, [lengths, angles], None)
+    assert not any(stop.start + EDGE < group.start < stop.stop - EDGE for group in found.groups)
+    assert len(found.groups) == STOPS - 1
+
+
+def test_a_stop_that_creeps_is_split():
+    lengths = recorded()[1]
+    last = np.tile(lengths[-1], (300, 1)) + 2e-3 * 0.1 * np.arange(1, 301)[:, None]
+    lengths = np.vstack([lengths, last])
+    time = 0.1 * np.arange(len(lengths))
+    found = rows_at_rest(time, [lengths], None)
+    assert len(found.groups) > STOPS + 1
+    assert np.max(found.means(lengths)[1]) < CREPT
