@@ -36,7 +36,8 @@ ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
     "--host", "--html", "--kind", "--mapping", "--measure", "--obstacles", "--only", "--out",
     "--parameters", "--path", "--picture", "--rails", "--reactions", "--resist", "--robot",
-    "--runs-from", "--scenario", "--set", "--taut", "--unknown", "--workers", "--wrench-set",
+    "--runs-from", "--scenario", "--set", "--taut", "--topic", "--unknown", "--workers",
+    "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
 
