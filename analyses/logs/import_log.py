@@ -16,6 +16,7 @@ from cdpr_drake.analyses.frame.words import (
     Names,
     RobotWord,
     Switch,
+    names,
     one_of,
     whole,
     words,
@@ -80,6 +81,13 @@ def _units(word: str) -> dict[str, str]:
     return checked_units({dimension: unit for dimension, _, unit in pairs})
 
 
+def _topics(word: str) -> list[str]:
+    topics = names(word)
+    if not all(topic.startswith("/") for topic in topics):
+        raise ValueError(word)
+    return topics
+
+
 def _rate(word: str) -> float:
     rate = float(word)
     if not 0.0 < rate < np.inf:
@@ -97,6 +105,9 @@ MappingFile: TypeAlias = Annotated[
 ]
 Rate: TypeAlias = Annotated[float | None, words(_rate, "above 0 [1/s]", "RATE")]
 Axes: TypeAlias = Annotated[Any, words(axes_rotation, "three axes, as -z,-x,y", "AXIS,AXIS,AXIS")]
+Topics: TypeAlias = Annotated[
+    Sequence[str] | None, words(_topics, "topics with commas, as /tracker/pose", "TOPIC,...")
+]
 OutFile: TypeAlias = Annotated[Path | str | None, words(Path, "the path of a file", "FILE")]
 
 
@@ -131,7 +142,7 @@ def import_log(
     beside: Annotated[Path | None, Parameter(name="--with")] = None,
     log_format: LogFormat = AUTO, with_format: LogFormat = AUTO, robot: RobotWord = None,
     cables: Names | None = None, unit: Units = None, mapping: MappingFile = None,
-    rate: Rate = None, body: str | None = None, topic: Names | None = None, axes: Axes = None,
+    rate: Rate = None, body: str | None = None, topic: Topics = None, axes: Axes = None,
     start: Annotated[float | None, Parameter(name="--from")] = None, until: float | None = None,
     every: Annotated[int, whole(1)] = 1, overwrite: Switch = False,
 ) -> Log:  # fmt: skip
