@@ -41,7 +41,7 @@ ANY_WORD = {
     "--bounds", "--cables", "--common", "--folder", "--free", "--gallery", "--goal", "--held",
     "--host", "--html", "--kind", "--log", "--mapping", "--measure", "--obstacles", "--only",
     "--out", "--parameters", "--path", "--picture", "--poses-from", "--rails", "--reactions",
-    "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut", "--topic",
+    "--resist", "--robot", "--runs-from", "--scenario", "--set", "--tags", "--taut",
     "--unknown", "--validate", "--workers", "--wrench-set",
 }  # fmt: skip
 """Options that take names or paths: what those are is known later."""
