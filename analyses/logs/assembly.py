@@ -28,7 +28,7 @@ from cdpr_drake.analyses.logs.columns import (
     read_header,
     unknown_unit,
 )
-from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, same_as_before
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, same_as_before
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
 from cdpr_drake.schema.fields import LARGEST
@@ -118,7 +118,7 @@ def assemble(
         if name in frame:
             here, there = (_rank(row, values), _rank(origin[name], frame[name]))
             if here == there:
-                raise LogFileError(f"{path}: column {own!r}: found {name} twice; accepted: once")
+                raise refusal(f"{path}: column {own!r}", f"{name} twice", "once")
             worse = origin[name] if here > there else row
             worse |= {"name": "", "by": "", "fate": WORSE}
             if here < there:
@@ -287,13 +287,13 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
     """A log whose times grow: rows that are there twice are left out, and counted."""
     time, path = log.time, log.path
     if not len(log.frame):
-        raise LogFileError(f"{path}: found no rows of measurements; accepted: at least one")
+        raise refusal(path, "no rows of measurements", "at least one")
     if time is None:
         return log
     finite = np.isfinite(time)
     if not finite.all():
         place = _place(lines, int(np.argmin(finite)))
-        raise LogFileError(f"{path}:{place}: time: found no number; accepted: a time in each row")
+        raise refusal(f"{path}:{place}: time", "no number", "a time in each row")
     twice = np.concatenate([[False], same_as_before(log.frame.to_numpy(float))])
     rows = np.flatnonzero(~twice)
     back = np.flatnonzero(np.diff(time[rows]) <= 0.0)

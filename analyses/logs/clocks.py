@@ -25,7 +25,7 @@ from cdpr_drake.analyses.logs.columns import (
     RPY,
     SECONDS,
 )
-from cdpr_drake.analyses.logs.log import Log
+from cdpr_drake.analyses.logs.log import Log, refusal
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
 from cdpr_drake.numerics.clock_alignment import align_clocks, interpolate_rows
@@ -136,9 +136,7 @@ def join_logs(first: Log, second: Log) -> Log:
     """
     if first.time is None or second.time is None:
         path = first.path if first.time is None else second.path
-        raise LogFileError(
-            f"{path}: time: found no column of times; accepted: one, to align two clocks"
-        )
+        raise refusal(f"{path}: time", "no column of times", "one, to align two clocks")
     both = [name for name in second.frame if name in first.frame and name != SECONDS]
     if both:
         raise LogFileError(
@@ -199,8 +197,7 @@ def _moving(log: Log, cables_first: bool) -> list[str]:
     kinds = [*winches, points, estimated] if cables_first else [points, *winches, estimated]
     columns = next((kind for kind in kinds if kind), [])
     if not columns:
-        raise LogFileError(
-            f"{log.path}: found no positions, lengths or motor angles; accepted: one of them, to "
-            "align two clocks"
+        raise refusal(
+            log.path, "no positions, lengths or motor angles", "one of them, to align two clocks"
         )
     return columns

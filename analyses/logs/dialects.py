@@ -19,7 +19,7 @@ from typing import Any
 from cdpr_drake.analyses.logs import machines, other_files
 from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
 from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
-from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.log import Facts, Log, refusal
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
 from cdpr_drake.analyses.logs.ros import (
     ROS1,
@@ -52,7 +52,8 @@ class Dialect:
     Attributes:
         title: What it writes, in words.
         knows: Why the beginning of a file, text or bytes, is of this dialect; empty if it is not.
-        read: Makes a log of path, text and facts; None: text with columns, see `columns`.
+        read: Makes a log of path, text and facts, or raises LogFileError, in one line with what is
+            damaged or missing; None: text with columns, see `columns`.
         columns: Patterns of whole headers, and the headers with units that they stand for, with
             {} for the first group; an empty one leaves columns out.
         binary: True if files are no text; `read` then gets an empty text.
@@ -99,32 +100,23 @@ def knows_columns(head: str) -> str:
 
 
 def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
-    """Text with columns, by its headers, the patterns of its dialect, or a mapping.
-
-    Raises:
-        LogFileError: It has no headers and no mapping says what its columns are, no column is
-            known, two say the same, or a cell is no number; names line and column.
-    """
+    """Text with columns, by its headers, the patterns of its dialect, or a mapping."""
     cells = read_cells(path, text, facts.separator, facts.skip_rows)
     rows, mapping, remarks = cells.rows, facts.mapping, list[str]()
     width, m = len(rows[0]), len(facts.cables or facts.robot_cables)
     headed = not all(is_number(cell, cells.decimal) for cell in rows[0])
     why = "columns as the mapping says"
     if headed and len(rows) < 2:
-        raise LogFileError(f"{path}: found a header without rows; accepted: one row at least")
+        raise refusal(path, "a header without rows", "one row at least")
     if isinstance(mapping, dict) and headed:
         missing = [name for name in mapping if name not in rows[0]]
         if missing:
-            raise LogFileError(
-                f"{path}: mapping: columns: found {missing[0]!r}; accepted: "
-                f"{', '.join(rows[0])[:120]}"
-            )
+            raise refusal(f"{path}: mapping: columns", f"{missing[0]!r}", ", ".join(rows[0])[:120])
         headers = [mapping.get(name, "") for name in rows[0]]
     elif mapping is not None and not isinstance(mapping, dict):
         if len(mapping) != width:
-            raise LogFileError(
-                f"{path}: mapping: columns: found {len(mapping)}; accepted: {width}, one for each "
-                "column"
+            raise refusal(
+                f"{path}: mapping: columns", len(mapping), f"{width}, one for each column"
             )
         headers = list(mapping)
     elif headed:
@@ -209,7 +201,7 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
         return read_bag(path, "", facts)
     if not path.is_file() or not path.stat().st_size:
         what = "a folder" if path.is_dir() else "an empty file" if path.exists() else "no such file"
-        raise LogFileError(f"{path}: found {what}; accepted: a log")
+        raise refusal(path, what, "a log")
     if dialect not in (AUTO, *DIALECTS):
         raise LogFileError(
             f"log format: found {dialect!r}; {accepted_names(dialect, (*DIALECTS, AUTO))}"
@@ -235,9 +227,6 @@ def recognise(path: Path) -> tuple[str, str]:
     """Name of the dialect of a file, and why; empty if none fits.
 
     `csv`, whose headers others have too, counts where no other dialect fits.
-
-    Raises:
-        LogFileError: The file cannot be read, or several dialects fit.
     """
     raw = read_bytes(path, HEAD)
     text = plain_text(raw, "ignore")

@@ -24,7 +24,7 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.logs.clocks import join_logs, without_packets
 from cdpr_drake.analyses.logs.columns import COMMANDED, ESTIMATED, UNITS
 from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, formats_words, read_log
-from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import with_mapping
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, LogFileError, OutputFolderError, accepted_names
@@ -34,11 +34,7 @@ DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 
 
 def checked_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Units by dimension, in small letters.
-
-    Raises:
-        LogFileError: There is no such dimension, or the unit is of another one.
-    """
+    """Units by dimension, in small letters."""
     checked = {}
     for dimension, unit in units.items():
         known = [name for name, (of, _) in UNITS.items() if of == dimension]
@@ -55,11 +51,7 @@ def checked_units(units: Mapping[str, str]) -> dict[str, str]:
 
 
 def axes_rotation(word: str) -> Array:
-    """R_WF from which axes of the file x, y and z of W are, as `z,x,y` or `-z,-x,y`.
-
-    Raises:
-        LogFileError: They are not three different axes, or would mirror the motion.
-    """
+    """R_WF from which axes of the file x, y and z of W are, as `z,x,y` or `-z,-x,y`."""
     R = np.zeros((3, 3))
     parts = [part.strip().lower() for part in word.split(",")]
     for row, part in enumerate(parts[:3]):
@@ -123,11 +115,9 @@ def facts_of(
             empty or the same.
     """
     if cables is not None and (not all(cables) or len(set(cables)) < len(cables)):
-        raise LogFileError(
-            f"cables: found {', '.join(cables)!r}; accepted: different names, as A,B,C,D"
-        )
+        raise refusal("cables", f"{', '.join(cables)!r}", "different names, as A,B,C,D")
     if rate is not None and not 0.0 < rate < np.inf:
-        raise LogFileError(f"rate: found {rate!r}; accepted: above 0 [1/s]")
+        raise refusal("rate", f"{rate!r}", "above 0 [1/s]")
     facts = Facts(
         cables=None if cables is None else tuple(cables), units=checked_units(unit or {}),
         rate=rate, body=body, topics=None if topic is None else tuple(topic),

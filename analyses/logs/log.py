@@ -39,6 +39,11 @@ AS_TOLD = "as told"
 """Ends words on units and times that a user said."""
 
 
+def refusal(place: object, value: object, accepted: object) -> LogFileError:
+    """The error of a value in a log; `place` is its file, line or row, and field."""
+    return LogFileError(f"{place}: found {value}; accepted: {accepted}")
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Facts:
     """What a user says of a log beside its file.
@@ -190,17 +195,14 @@ class Log(Result):
         frame, time = self.frame, self.time
         if start is not None or end is not None:
             if time is None:
-                raise LogFileError(
-                    f"{self.path}: time: found no column of times; accepted: one, for a part"
-                )
+                raise refusal(f"{self.path}: time", "no column of times", "one, for a part")
             low, high = -np.inf if start is None else start, np.inf if end is None else end
             frame = frame[(time >= low) & (time <= high)]
             if not len(frame):
                 since = "" if start is None else f" from {start:g} s"
                 until = "" if end is None else f" until {end:g} s"
-                raise LogFileError(
-                    f"{self.path}: found no rows{since}{until}; accepted: a part of "
-                    f"{time[0]:g} to {time[-1]:g} s"
+                raise refusal(
+                    self.path, f"no rows{since}{until}", f"a part of {time[0]:g} to {time[-1]:g} s"
                 )
         return replace(self, frame=frame.iloc[::every].reset_index(drop=True))
 

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.logs.columns import (
     SWIVEL,
     TENSION,
 )
-from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import read_cells
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
@@ -52,9 +52,6 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
     """Reads motor angles [deg], positions [mm] of some rows, and forces; a row is a pose at rest.
 
     Forces have no unit there; they are kept as raw_force unless the user names one.
-
-    Raises:
-        LogFileError: Its arrays do not fit each other, or a cell is no number.
     """
     why = knows_hangprinter(text)
     lines, decimal = None, "."
@@ -62,7 +59,7 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
         tables = {name: _series(path, text, name) for name in _ARRAYS}
         motors = tables["motor_pos_samp"]
         if not motors:
-            raise LogFileError(f"{path}: motor_pos_samp: found no rows; accepted: one at least")
+            raise refusal(f"{path}: motor_pos_samp", "no rows", "one at least")
         letters = list("ABCDEFGHIJKL"[: len(motors[0])])
         shown = {"motor_pos_samp": [f"motor_{letter}_deg" for letter in letters],
                  "xyz_of_samp": ["x_mm", "y_mm", "z_mm"],
@@ -84,7 +81,7 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
         own, lines, decimal = cells.rows[0], cells.lines[1:], cells.decimal
         columns = [list(column) for column in zip(*cells.rows[1:], strict=True)]
         if not columns:
-            raise LogFileError(f"{path}: found a header without rows; accepted: one row at least")
+            raise refusal(path, "a header without rows", "one row at least")
         letters = [found[1] for cell in own if (found := _MOTOR.fullmatch(cell))]
     names = facts.names(path, len(letters), letters)
     name_of = dict(zip(letters, names, strict=True))
@@ -117,9 +114,7 @@ def _series(path: Path, text: str, name: str) -> list[list[str]]:
     )]  # fmt: skip
     if len(starts) > 1:
         places = ", ".join(str(plain.count("\n", 0, start) + 1) for start in starts)
-        raise LogFileError(
-            f"{path}: {name}: found {len(starts)} times, in lines {places}; accepted: once"
-        )
+        raise refusal(f"{path}: {name}", f"{len(starts)} times, in lines {places}", "once")
     if not starts:
         return []
     depth, end = 0, len(plain)
@@ -129,9 +124,7 @@ def _series(path: Path, text: str, name: str) -> list[list[str]]:
             end = place
             break
     else:
-        raise LogFileError(
-            f"{path}: {name}: found brackets that do not close; accepted: [[...], ...]"
-        )
+        raise refusal(f"{path}: {name}", "brackets that do not close", "[[...], ...]")
     rows = []
     for found in re.finditer(r"\[([^\[\]]*)\]", plain[starts[0] + 1 : end]):
         cells = [cell.strip() for cell in found[1].strip().rstrip(",").split(",")]
@@ -147,7 +140,7 @@ def _series(path: Path, text: str, name: str) -> list[list[str]]:
             cells[k] = "" if word.lstrip("-").lower() == "nan" else word
         rows.append(cells)
     if not rows and plain[starts[0] + 1 : end].strip():
-        raise LogFileError(f"{path}: {name}: found no table of numbers; accepted: [[...], ...]")
+        raise refusal(f"{path}: {name}", "no table of numbers", "[[...], ...]")
     return rows
 
 
@@ -167,9 +160,6 @@ def read_maslow(path: Path, text: str, facts: Facts) -> Log:
     """Reads belt lengths [mm] at the poses of a calibration, in the plane of the work.
 
     The firmware repeats its list with more poses each time, or sends poses one by one.
-
-    Raises:
-        LogFileError: A pose has other belts than the first one, or a length is no number.
     """
     lines = list(enumerate(text.split("\n"), 1))
     if "CLBM" in knows_maslow(text):
@@ -187,13 +177,11 @@ def read_maslow(path: Path, text: str, facts: Facts) -> Log:
         else:
             series += poses
     if not series:
-        raise LogFileError(f"{path}: found no belts; accepted: CLBM:[{{bl:..., br:..., ...}}, ...]")
+        raise refusal(path, "no belts", "CLBM:[{bl:..., br:..., ...}, ...]")
     names = list(series[0][1])
     for number, belts in series:
         if set(belts) != set(names):
-            raise LogFileError(
-                f"{path}:{number}: found the belts {', '.join(belts)}; accepted: {', '.join(names)}"
-            )
+            raise refusal(f"{path}:{number}", f"the belts {', '.join(belts)}", ", ".join(names))
     new = facts.names(path, len(names), names)
     columns = [
         (f"{cable}_length_mm", [belts[name] for _, belts in series])
@@ -259,9 +247,6 @@ def knows_grab(head: str) -> str:
 def read_grab(path: Path, text: str, facts: Facts) -> Log:
     """Reads lengths [m], swivel angles [rad], tensions, wanted tensions [N], and roll, pitch, yaw
     [deg]; one time is one row. Lengths and swivels count from where encoders were switched on.
-
-    Raises:
-        LogFileError: A line is damaged; names it.
     """
     rows: list[dict[tuple[str, int], float]] = []
     times: list[float] = []
@@ -275,9 +260,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
             continue
         if cells[0] not in (_ACTUATOR, _INCLINOMETER):
             if not cells[0].isdigit():
-                raise LogFileError(
-                    f"{path}:{number}: type: found {cells[0][:20]!r}; accepted: a number"
-                )
+                raise refusal(f"{path}:{number}: type", f"{cells[0][:20]!r}", "a number")
             other[cells[0]] = other.get(cells[0], 0) + 1
             continue
         actuator = cells[0] == _ACTUATOR
@@ -285,9 +268,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         values = _line_numbers(path, number, cells, (width or 14) if actuator else _TILT_CELLS)
         key = int(values[2])
         if actuator and not (key == values[2] and 0 <= key < _MOST_ACTUATORS):
-            raise LogFileError(
-                f"{path}:{number}: actuator: found {cells[2]}; accepted: a whole number from 0"
-            )
+            raise refusal(f"{path}:{number}: actuator", cells[2], "a whole number from 0")
         row = place.get(values[1])
         if row is None and rows and actuator and width < 14:
             near = 0.0 < values[1] - times[-1] < _JITTER and (LENGTH, key) not in rows[-1]
@@ -299,9 +280,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
             times.append(values[1])
             at_line.append(number)
         if actuator and (LENGTH, key) in rows[row]:
-            raise LogFileError(
-                f"{path}:{number}: found actuator {key} twice at {values[1]:g} s; accepted: once"
-            )
+            raise refusal(f"{path}:{number}", f"actuator {key} twice at {values[1]:g} s", "once")
         if actuator:
             rows[row] |= {(what, key): values[j] for what, j in _LAYOUTS[width].items()}
         else:
@@ -342,14 +321,10 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
 
 def _line_numbers(path: Path, number: int, cells: list[str], width: int) -> list[float]:
     if len(cells) != width:
-        raise LogFileError(
-            f"{path}:{number}: found {len(cells)} cells of type {cells[0]}; accepted: {width}"
-        )
+        raise refusal(f"{path}:{number}", f"{len(cells)} cells of type {cells[0]}", width)
     for j, cell in enumerate(cells):
         if not is_number(cell) or plain_number(cell) == "nan":
-            raise LogFileError(
-                f"{path}:{number}: cell {j + 1}: found {cell[:30]!r}; accepted: a finite number"
-            )
+            raise refusal(f"{path}:{number}: cell {j + 1}", f"{cell[:30]!r}", "a finite number")
     return [float(cell) for cell in cells]
 
 
@@ -369,9 +344,6 @@ def read_graffiti(path: Path, text: str, facts: Facts) -> Log:
     """Reads lengths, estimated and wanted positions [m] of a robot on an upright wall.
 
     x is to the right and y upwards, which are x and z of W; 0 0 is no wanted position.
-
-    Raises:
-        LogFileError: A line is damaged, or the rate was not given.
     """
     lines = [(k, line) for k, line in enumerate(text.split("\n"), 1) if line.strip()]
     rows: list[list[float]] = []
@@ -385,13 +357,9 @@ def read_graffiti(path: Path, text: str, facts: Facts) -> Log:
         elif cells is None and number == lines[-1][0]:
             remarks.append(f"the last line, {number}, is cut off and was left out")
         else:
-            raise LogFileError(
-                f"{path}:{number}: found {line[:40]!r}; accepted: mode: x y - x y | e s l v | ..."
-            )
+            raise refusal(f"{path}:{number}", f"{line[:40]!r}", "mode: x y - x y | e s l v | ...")
     if facts.rate is None:
-        raise LogFileError(
-            f"{path}: time: found no column of times; accepted: one, or use rate [1/s]"
-        )
+        raise refusal(f"{path}: time", "no column of times", "one, or use rate [1/s]")
     table = np.array(rows)
     names = facts.names(path, (table.shape[1] - 5) // 4)
     wanted = table[:, 3:5]

@@ -33,7 +33,7 @@ from cdpr_drake.analyses.logs.columns import (
     TURN,
 )
 from cdpr_drake.analyses.logs.dialects import AUTO, read_log
-from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.log import Facts, Log, refusal
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector, rotation_vector
@@ -224,10 +224,7 @@ def read_measurements(
     facts = replace(Facts() if facts is None else facts, robot_cables=tuple(cables))
     log = read_log(path, facts, dialect)
     if len(log.frame) > MOST_ROWS:
-        raise LogFileError(
-            f"{path}: found {len(log.frame)} rows; accepted: at most {MOST_ROWS}, such as every "
-            "tenth"
-        )
+        raise refusal(path, f"{len(log.frame)} rows", f"at most {MOST_ROWS}, such as every tenth")
     return bind_log(log, cables)
 
 
@@ -308,11 +305,7 @@ def _robot_columns(log: Log, names: Sequence[str]) -> tuple[pd.DataFrame, set[st
 
 
 def poses_of(path: Path, columns: Mapping[str, Array]) -> list[RigidTransform | None]:
-    """Poses of columns of positions and of a rotation; None in rows without.
-
-    Raises:
-        LogFileError: Some of their columns are missing, or a quaternion is no rotation.
-    """
+    """Poses of columns of positions and of a rotation; None in rows without."""
     kind = next((kind for kind in ROTATIONS if set(PARTS[kind]) & set(columns)), None)
     if kind is None:
         raise LogFileError(
@@ -331,9 +324,7 @@ def _whole(path: Path, kind: str, columns: Mapping[str, Array]) -> Array:
     """All parts of a kind, shape (k, n)."""
     present = [columns[name] for name in PARTS[kind] if name in columns]
     if len(present) < len(PARTS[kind]):
-        raise LogFileError(
-            f"{path}: {kind}: found {len(present)} columns; accepted: all {len(PARTS[kind])}"
-        )
+        raise refusal(f"{path}: {kind}", f"{len(present)} columns", f"all {len(PARTS[kind])}")
     return np.column_stack(present)
 
 
@@ -344,9 +335,7 @@ def _rotations(path: Path, kind: str, columns: Mapping[str, Array]) -> list[Rota
         size = np.linalg.norm(table, axis=1)
         off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
         if len(off):
-            raise LogFileError(
-                f"{path}: row {off[0] + 1}: quaternion: found length {size[off[0]]:g}; accepted: 1"
-            )
+            raise refusal(f"{path}: row {off[0] + 1}: quaternion", f"length {size[off[0]]:g}", "1")
     makers: dict[str, Callable[[Array], RotationMatrix]] = {
         QUATERNION: _of_quaternion, TAIT: rotation_from_angles, TURN: rotation_from_vector,
         RPY: lambda values: RotationMatrix(RollPitchYaw(values)),

@@ -16,7 +16,7 @@ import numpy as np
 
 from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, numbers
 from cdpr_drake.analyses.logs.columns import PARTS, QUATERNION, SECONDS
-from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import Cells, read_cells
 from cdpr_drake.errors import LogFileError, accepted_names
 
@@ -46,36 +46,26 @@ def knows_motive(head: str) -> str:
 
 
 def read_motive(path: Path, text: str, facts: Facts) -> Log:
-    """Reads poses of the platform's rigid body, and markers that belong to no body.
-
-    Raises:
-        LogFileError: It does not say its unit, has no body or several, or a cell is no number.
-    """
+    """Reads poses of the platform's rigid body, and markers that belong to no body."""
     lines = text.split("\n")
     place = next((k for k, line in enumerate(lines[:_MOST_HEAD]) if line.startswith("Frame,")), -1)
     if place < 0:
-        raise LogFileError(
-            f"{path}: found no line that begins with Frame; accepted: one above rows"
-        )
+        raise refusal(path, "no line that begins with Frame", "one above rows")
     axes = _split(lines[place])
     head = [(_split(line) + [""] * len(axes))[: len(axes)]
             for line in lines[1:place] if line.strip(", \t")]  # fmt: skip
     types = next((row for row in head if any(BODY in c or c == MARKER for c in row)), None)
     parts = next((row for row in head if "Position" in row), None)
     if types is None or parts is None:
-        raise LogFileError(f"{path}: found no types or no Position above the rows; accepted: both")
+        raise refusal(path, "no types or no Position above the rows", "both")
     pairs = _split(lines[0])
     settings = dict(zip(pairs[::2], pairs[1::2], strict=False))
     if settings.get("Rotation Type", "Quaternion") != "Quaternion":
-        raise LogFileError(
-            f"{path}: Rotation Type: found {settings['Rotation Type']}; accepted: Quaternion"
-        )
+        raise refusal(f"{path}: Rotation Type", settings["Rotation Type"], "Quaternion")
     names = head[min(head.index(types) + 1, len(head) - 1)]
     cells = read_cells(path, text, ",", skip=place + 1)
     if len(cells.rows[0]) != len(axes):
-        raise LogFileError(
-            f"{path}:{cells.lines[0]}: found {len(cells.rows[0])} cells; accepted: {len(axes)}"
-        )
+        raise refusal(f"{path}:{cells.lines[0]}", f"{len(cells.rows[0])} cells", len(axes))
     unit, words = _unit(path, settings, facts)
     groups = _groups(path, types, names, [f"{p} {a}" for p, a in zip(parts, axes, strict=True)])
     body = _platform(path, groups, cells, facts)
@@ -96,9 +86,7 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
         size = np.linalg.norm(q, axis=0)
         if np.any(np.abs(size - 1.0) > _TURN):
             k = int(np.argmax(np.abs(size - 1.0) > _TURN))
-            raise LogFileError(
-                f"{path}:{cells.lines[k]}: quaternion: found length {size[k]:.4g}; accepted: 1"
-            )
+            raise refusal(f"{path}:{cells.lines[k]}: quaternion", f"length {size[k]:.4g}", "1")
     shown = [" ".join(filter(None, (names[j], parts[j], axes[j]))) for j in range(len(axes))]
     return assemble(
         path, "motive", knows_motive(text), list(columns.items()), facts, lines=cells.lines,
@@ -122,20 +110,14 @@ def _unit(path: Path, settings: dict[str, str], facts: Facts) -> tuple[str, str]
             "use unit length=m, mm or cm"
         )
     if known is not None and told not in (None, known):
-        raise LogFileError(
-            f"{path}: Length Units: found {named}, and {told} with unit; accepted: one of them"
-        )
+        raise refusal(f"{path}: Length Units", f"{named}, and {told} with unit", "one of them")
     if known is not None:
         return known, f"{named.lower()} by the file's Length Units"
     return str(told), f"{told}, {AS_TOLD}"
 
 
 def _groups(path: Path, types: list[str], names: list[str], parts: list[str]) -> Groups:
-    """Columns of each body and marker.
-
-    Raises:
-        LogFileError: A body or a marker has some of its columns only.
-    """
+    """Columns of each body and marker."""
     groups: Groups = {}
     for j, (kind, name, part) in enumerate(zip(types, names, parts, strict=True)):
         if j > 1 and part in _PARTS.get(kind, ()):
@@ -164,13 +146,13 @@ def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:
     words = ", ".join(f"{name!r} ({count} rows)" for name, count in bodies.items())
     if facts.body is not None:
         if facts.body not in bodies:
-            raise LogFileError(f"{path}: body: found {facts.body!r}; accepted: {words or 'none'}")
+            raise refusal(f"{path}: body", f"{facts.body!r}", words or "none")
         return facts.body
     visible = [name for name, count in bodies.items() if count]
     if len(visible) > 1:
-        raise LogFileError(f"{path}: body: found {words}; accepted: one of them; use body")
+        raise refusal(f"{path}: body", words, "one of them; use body")
     if not visible and not any(kind == MARKER for kind, _ in groups):
-        raise LogFileError(f"{path}: found no rigid body and no marker; accepted: one at least")
+        raise refusal(path, "no rigid body and no marker", "one at least")
     return visible[0] if visible else ""
 
 

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.logs.columns import (
     SWIVEL,
     TENSION,
 )
-from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.log import Facts, Log, refusal
 from cdpr_drake.analyses.logs.ros import read_bag
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC, TIME_KEY
 from cdpr_drake.arrays import Array
@@ -48,10 +48,6 @@ _ROBOT = {"EndEffector", "Trasmission"}
 def read_mat(path: Path, _: str, facts: Facts) -> Log:
     """Reads a log of GRAB's tools, or the variables that a mapping names, as
     `st.tensions: "{c}_tension_n"` with {c} for the names of cables.
-
-    Raises:
-        LogFileError: It cannot be read, has none of these variables, is a robot, or its variables
-            do not have equally many rows.
     """
     from scipy.io import loadmat
 
@@ -62,9 +58,7 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
         raise LogFileError(f"{path}: cannot be read as a file of MATLAB: {words}") from problem
     variables = dict(_flat("", {k: v for k, v in content.items() if not k.startswith("__")}))
     if {name.split(".")[1] for name in variables if "." in name} >= _ROBOT:
-        raise LogFileError(
-            f"{path}: found a robot of GRAB's tools; accepted: logs; see cdpr import"
-        )
+        raise refusal(path, "a robot of GRAB's tools", "logs; see cdpr import")
     wanted = _wanted(path, variables, facts)
     tables = {name: _table(path, name, variables[name]) for name in wanted}
     count = max(len(table) for table in tables.values())
@@ -72,12 +66,10 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
     for name, headers in wanted.items():
         table = tables[name]
         if len(table) != count:
-            raise LogFileError(
-                f"{path}: {name}: found {len(table)} rows; accepted: {count}, as the others have"
-            )
+            raise refusal(f"{path}: {name}", f"{len(table)} rows", f"{count}, as the others have")
         for header, column in zip(_spread(path, name, headers, table, facts), table.T, strict=True):
             if header in columns:
-                raise LogFileError(f"{path}: {name}: found {header} twice; accepted: once")
+                raise refusal(f"{path}: {name}", f"{header} twice", "once")
             columns[header] = column
     columns = dict(sorted(columns.items(), key=lambda item: item[0] != SECONDS))
     rest = [name for name in variables if name not in wanted]
@@ -106,7 +98,7 @@ def _wanted(path: Path, variables: dict[str, Any], facts: Facts) -> dict[str, li
     """Headers of the variables that are read."""
     mapping = facts.mapping
     if mapping is not None and not isinstance(mapping, dict):
-        raise LogFileError(f"{path}: mapping: columns: found a list; accepted: variable: header")
+        raise refusal(f"{path}: mapping: columns", "a list", "variable: header")
     if mapping is None:
         last = {name: name.rpartition(".")[2] for name in variables}
         known = {
@@ -138,7 +130,7 @@ def _table(path: Path, name: str, value: Any) -> Array:
     if table.ndim == 1:
         return table[:, None]
     if table.ndim != 2:
-        raise LogFileError(f"{path}: {name}: found shape {table.shape}; accepted: rows and columns")
+        raise refusal(f"{path}: {name}", f"shape {table.shape}", "rows and columns")
     return table.T if table.shape[0] < table.shape[1] else table
 
 
@@ -148,8 +140,8 @@ def _spread(path: Path, name: str, headers: list[str], table: Array, facts: Fact
     if len(headers) == 1 and "{c}" in headers[0]:
         return [headers[0].replace("{c}", cable) for cable in facts.names(path, width)]
     if len(headers) != width:
-        raise LogFileError(
-            f"{path}: {name}: found {width} columns; accepted: {len(headers)}: {', '.join(headers)}"
+        raise refusal(
+            f"{path}: {name}", f"{width} columns", f"{len(headers)}: {', '.join(headers)}"
         )
     return headers
 
@@ -166,9 +158,6 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
     platform's pose.
 
     Source: mcap.dev/spec.
-
-    Raises:
-        LogFileError: It cannot be read, has no messages in JSON, or channels of other times.
     """
     if find_spec("mcap") is None:
         raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
@@ -178,7 +167,7 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
         return read_bag(path, "", facts)
     if not chosen:
         found = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
-        raise LogFileError(f"{path}: found {found}; accepted: messages in JSON")
+        raise refusal(path, found, "messages in JSON")
     (first, rows), *rest = chosen.items()
     times = list(rows)
     for topic, others in rest:

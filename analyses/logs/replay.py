@@ -42,7 +42,7 @@ from cdpr_drake.analyses.logs.import_log import (
     Units,
     facts_of,
 )
-from cdpr_drake.analyses.logs.log import Log
+from cdpr_drake.analyses.logs.log import Log, refusal
 from cdpr_drake.analyses.logs.measurements import bind_log
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
@@ -459,7 +459,7 @@ def _fitted_frame(log: Log, poses: Array, by_lengths: Array, rows: np.ndarray) -
     middle_F, middle_W = p_F.mean(axis=0), p_W.mean(axis=0)
     U, s, Vt = np.linalg.svd((p_F - middle_F).T @ (p_W - middle_W))
     if s[1] < 1e-6 * s[0]:
-        raise LogFileError(f"{log.path}: found positions along a line; accepted: some off a line")
+        raise refusal(log.path, "positions along a line", "some off a line")
     R = Vt.T @ np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))]) @ U.T
     return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), middle_W - R @ middle_F)
 
@@ -482,7 +482,7 @@ def _follow(replay: Replay) -> Followed:
     at = np.where(whole, replay.poses, replay.poses_by_lengths)
     known = rows[np.isfinite(at[rows]).all(axis=1)]
     if not len(known):
-        raise LogFileError(f"{path}: found no pose to start at; accepted: at least one")
+        raise refusal(path, "no pose to start at", "at least one")
     rows = rows[rows >= known[0]]
     time = replay.time[rows] - replay.time[rows[0]]
     block = CompiledCableRobot(robot, rule=StepRule(), command_period=HELD)

@@ -87,9 +87,6 @@ def read_bag(path: Path, _: str, facts: Facts) -> Log:
     Args:
         path: The bag.
         facts: What the user says.
-
-    Raises:
-        LogFileError: It cannot be read, has no such topic, or no numbers.
     """
     if find_spec("rosbags") is None:
         raise LogFileError(f"{path}: needs rosbags, which is not installed; {install_words('ros')}")

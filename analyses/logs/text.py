@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cdpr_drake.analyses.logs.log import Facts
+from cdpr_drake.analyses.logs.log import Facts, refusal
 from cdpr_drake.errors import LogFileError, accepted_names, why_not_read
 from cdpr_drake.schema.input_files import file_size
 from cdpr_drake.schema.yaml_files import load_yaml
@@ -48,14 +48,10 @@ def plain_text(raw: bytes, errors: str = "strict") -> str | None:
 
 
 def read_bytes(path: Path, most: int = -1) -> bytes:
-    """Bytes of a file, or its first ones.
-
-    Raises:
-        LogFileError: It cannot be read, or is too large.
-    """
+    """Bytes of a file, or its first ones."""
     try:
         if file_size(path) > MOST_BYTES:
-            raise LogFileError(f"{path}: found more than {MOST_BYTES:,} bytes; accepted: fewer")
+            raise refusal(path, f"more than {MOST_BYTES:,} bytes", "fewer")
         with path.open("rb") as file:
             return file.read(most)
     except OSError as problem:
@@ -63,20 +59,15 @@ def read_bytes(path: Path, most: int = -1) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file.
-
-    Raises:
-        LogFileError: It cannot be read, is too large, or is no text.
-    """
+    """Text of a file."""
     try:
         text = plain_text(read_bytes(path))
     except UnicodeDecodeError as problem:
-        raise LogFileError(
-            f"{path}: found byte {problem.start} that is not of {problem.encoding}; accepted: text "
-            "in UTF-8"
+        raise refusal(
+            path, f"byte {problem.start} that is not of {problem.encoding}", "text in UTF-8"
         ) from problem
     if text is None:
-        raise LogFileError(f"{path}: found bytes that are no text; accepted: text")
+        raise refusal(path, "bytes that are no text", "text")
     return text
 
 
@@ -100,9 +91,6 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
         text: Its content.
         separator: Sign between cells; None: by the first row.
         skip: Lines to leave out at the top.
-
-    Raises:
-        LogFileError: There are no rows, or one has another number of cells than the first.
     """
     numbered = [
         (number, line)
@@ -110,7 +98,7 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
         if number > skip and line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
-        raise LogFileError(f"{path}: found no rows; accepted: rows of measurements")
+        raise refusal(path, "no rows", "rows of measurements")
     separator = separator or separator_of(numbered[0][1])
     lines = [number for number, _ in numbered]
     try:
@@ -122,14 +110,14 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
     except csv.Error as problem:
         raise LogFileError(f"{path}: cannot be read as a table: {problem}") from problem
     if len(rows) != len(lines):
-        raise LogFileError(f"{path}: found quotes round a line end; accepted: a row a line")
+        raise refusal(path, "quotes round a line end", "a row a line")
     width = len(rows[0])
     for row, number in zip(rows, lines, strict=True):
         while len(row) > width and not row[-1]:  # a separator at the end of the line
             row.pop()
         if len(row) != width:
-            raise LogFileError(
-                f"{path}:{number}: found {len(row)} cells; accepted: {width}, as in line {lines[0]}"
+            raise refusal(
+                f"{path}:{number}", f"{len(row)} cells", f"{width}, as in line {lines[0]}"
             )
     return Cells(rows, lines, _decimal(rows, separator))
 
@@ -166,14 +154,10 @@ _ACCEPTED = {
 
 
 def with_mapping(facts: Facts, path: Path) -> Facts:
-    """Facts with what a mapping file says: YAML with columns, skip_rows, separator, rate_hz.
-
-    Raises:
-        LogFileError: It cannot be read, or says something else.
-    """
+    """Facts with what a mapping file says: YAML with columns, skip_rows, separator, rate_hz."""
     try:
         if file_size(path) > MOST_MAPPING:
-            raise LogFileError(f"{path}: found more than {MOST_MAPPING:,} bytes; accepted: fewer")
+            raise refusal(path, f"more than {MOST_MAPPING:,} bytes", "fewer")
         content = load_yaml(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:
         words = " ".join(why_not_read(problem).split())
@@ -187,9 +171,7 @@ def with_mapping(facts: Facts, path: Path) -> Facts:
                 f"{path}: found {key!r}; {accepted_names(key, _ACCEPTED)}"
             ) from problem
         value = content.get(key) if isinstance(content, dict) else content
-        raise LogFileError(
-            f"{path}: {key}: found {str(value)[:80]}; accepted: {_ACCEPTED[key]}"
-        ) from problem
+        raise refusal(f"{path}: {key}", str(value)[:80], _ACCEPTED[key]) from problem
     headers: Any = mapping.columns
     if isinstance(headers, dict):
         headers = {name: header or "" for name, header in headers.items()}
