@@ -30,7 +30,6 @@ from cdpr_drake.analyses.logs.columns import (
 )
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, same_as_before
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError
 from cdpr_drake.schema.fields import LARGEST
 
 Cells = Sequence[str] | Array
@@ -102,10 +101,9 @@ def assemble(
             row["fate"] = WORDS
             continue
         if bad is not None:
-            raise LogFileError(
-                f"{path}:{_place(lines, bad)}: {own[:40]}: found "
-                f"{str(cells[bad])[:40]!r}; accepted: a number up to {LARGEST:g}, or an empty cell"
-            )
+            place = f"{path}:{_place(lines, bad)}: {own[:40]}"
+            accepted = f"a number up to {LARGEST:g}, or an empty cell"
+            raise refusal(place, repr(str(cells[bad])[:40]), accepted)
         name, factor = header, 1.0
         if column is None:
             unit = unknown_unit(header, names, first)
@@ -125,10 +123,10 @@ def assemble(
                 continue
         frame[name], origin[name], row["name"] = factor * values, row, name
     if not any(row["fate"] == READ for row in rows):
-        raise LogFileError(
-            f"{path}: columns: found {', '.join(filter(None, headers))[:120]}; accepted: time_s, "
-            "C1_length_m, x_m, qw, C1_tension_n and the like, or a mapping that says so"
+        accepted = (
+            "time_s, C1_length_m, x_m, qw, C1_tension_n and the like, or a mapping that says so"
         )
+        raise refusal(f"{path}: columns", ", ".join(filter(None, headers))[:120], accepted)
     counted = SECONDS not in frame and facts.rate is not None
     if counted and facts.rate is not None:
         count = len(next(iter(frame.values())))
@@ -299,11 +297,9 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
     back = np.flatnonzero(np.diff(time[rows]) <= 0.0)
     if len(back):
         before, after = rows[back[0]], rows[back[0] + 1]
-        raise LogFileError(
-            f"{path}:{_place(lines, int(after))}: time: found {time[after]:.9g} s after "
-            f"{time[before]:.9g} s; accepted: times that grow, and rows twice only where all of "
-            "them is the same"
-        )
+        words = f"{time[after]:.9g} s after {time[before]:.9g} s"
+        accepted = "times that grow, and rows twice only where all of them is the same"
+        raise refusal(f"{path}:{_place(lines, int(after))}: time", words, accepted)
     changes: dict[str, Any] = {"repeated": int(twice.sum())}
     if twice.any():
         changes["frame"] = log.frame.iloc[rows].reset_index(drop=True)

@@ -27,7 +27,6 @@ from cdpr_drake.analyses.logs.columns import (
 )
 from cdpr_drake.analyses.logs.log import Log, refusal
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError
 from cdpr_drake.numerics.clock_alignment import align_clocks, interpolate_rows
 
 TOGETHER = 0.25
@@ -46,9 +45,6 @@ are pauses of the recorder: they do not count for the mean step."""
 LATEST = 1.5
 """A reading that is off the clock by more than so many packets: the clock did not run evenly, or
 readings were lost, and nothing is changed."""
-
-SENSOR = "roll, pitch, yaw"
-"""What is read together, in the words of remarks."""
 
 
 def without_packets(log: Log) -> Log:
@@ -86,17 +82,14 @@ def without_packets(log: Log) -> Log:
     even[(time < taken[0]) | (time > taken[-1])] = np.nan
     frame = log.frame.assign(**dict(zip(names, even.T, strict=True)))
     return replace(log, frame=frame).with_remarks(
-        f"{SENSOR} came in packets of {packet:.3g} readings: they are read as taken every "
+        f"roll, pitch, yaw came in packets of {packet:.3g} readings: they are read as taken every "
         f"{1e3 * float(period):.4g} ms, up to {1e3 * float(np.max(came - taken)):.3g} ms before "
         "they came"
     )
 
 
 def _uneven(came: Array, last: np.ndarray, off: Array, allowed: float, absent: Array) -> str:
-    """Where the clock of packets is not even, and how many readings that concerns.
-
-    Holes are seen by medians, since they change the mean.
-    """
+    """Where the clock of packets is not even; holes are seen by medians: they change the mean."""
     ends, counts = came[last], np.diff(last)
     took = np.diff(ends)
     each, packet = float(np.median(took / counts)), float(np.median(counts))
@@ -119,8 +112,8 @@ def _uneven(came: Array, last: np.ndarray, off: Array, allowed: float, absent: A
             f"than {1e3 * allowed:.3g} ms, the farthest by {1e3 * off[k]:.3g} ms at {came[k]:.6g} s"
         )
     return (
-        f"{SENSOR} came in packets of {packet:.3g} readings, and stay in the rows in which they "
-        f"came, since it is not known when they were taken: {'; '.join(parts)}"
+        f"roll, pitch, yaw came in packets of {packet:.3g} readings, and stay in the rows in "
+        f"which they came, since it is not known when they were taken: {'; '.join(parts)}"
     )
 
 
@@ -139,10 +132,8 @@ def join_logs(first: Log, second: Log) -> Log:
         raise refusal(f"{path}: time", "no column of times", "one, to align two clocks")
     both = [name for name in second.frame if name in first.frame and name != SECONDS]
     if both:
-        raise LogFileError(
-            f"{second.path}: found {', '.join(both[:4])}, which {first.path} has, too; accepted: "
-            "each column in one of the two logs"
-        )
+        words = f"{', '.join(both[:4])}, which {first.path} has, too"
+        raise refusal(second.path, words, "each column in one of the two logs")
     by = _moving(first, True), _moving(second, False)
     clock = align_clocks(first.time, first.table(by[0]), second.time, second.table(by[1]))
     names = [name for name in second.frame if name != SECONDS]

@@ -16,19 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.logs import machines, other_files
+from cdpr_drake.analyses.logs import machines, matlab, ros
 from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
 from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
 from cdpr_drake.analyses.logs.log import Facts, Log, refusal
 from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
-from cdpr_drake.analyses.logs.ros import (
-    ROS1,
-    ROS_COLUMNS,
-    SQLITE,
-    Headers,
-    read_bag,
-    renamed,
-)
+from cdpr_drake.analyses.logs.ros import ROS_COLUMNS, Headers, read_bag, renamed
 from cdpr_drake.analyses.logs.text import (
     plain_text,
     read_bytes,
@@ -37,6 +30,7 @@ from cdpr_drake.analyses.logs.text import (
     separator_of,
     split_line,
 )
+from cdpr_drake.analyses.reporting.mcap_log import MAGIC
 from cdpr_drake.errors import LogFileError, accepted_names
 
 AUTO, CSV = "auto", "csv"
@@ -88,10 +82,8 @@ def knows_columns(head: str) -> str:
         return ""
     separator = separator_of(lines[0])
     cells, below = (split_line(line, separator) for line in lines)
-    values = [
-        is_number(cell, "," if separator not in (",", None) and "," in cell else ".")
-        for cell in below
-    ]
+    comma = separator not in (",", None)
+    values = [is_number(cell, "," if comma and "," in cell else ".") for cell in below]
     names = ["C" + str(k + 1) for k in range(MOST_CABLES)] + cable_names(cells)
     known = [cell for cell in cells if read_header(cell, names) is not None]
     if not known or len(below) != len(cells) or sum(values) < 0.5 * len(values):
@@ -168,17 +160,16 @@ DIALECTS = {
     ),
     CSV: Dialect("text with columns, with headers or a mapping", knows_columns),
     "mat": Dialect(
-        "GRAB's parsed .mat, or any with a mapping", magic(other_files.MAT), other_files.read_mat,
-        binary=True,
+        "GRAB's parsed .mat, or any with a mapping", magic(matlab.MAT), matlab.read_mat, binary=True
     ),
     "rosbag": Dialect(
         "bags of ROS 1 and 2: .bag, .db3, .mcap with CDR, or their folder",
-        lambda head: magic(ROS1)(head) or magic(SQLITE, "the magic bytes of SQLite")(head),
+        lambda head: magic(ros.ROS1)(head) or magic(ros.SQLITE, "the magic bytes of SQLite")(head),
         read_bag, binary=True,
     ),
     "mcap": Dialect(
         "MCAP with messages in JSON, as runs leave it",
-        magic(other_files.MCAP, "the magic bytes of MCAP"), other_files.read_mcap, binary=True,
+        magic(MAGIC, "the magic bytes of MCAP"), ros.read_mcap, binary=True,
     ),
 }  # fmt: skip
 """Dialects by the name of `--log-format`."""
@@ -203,9 +194,8 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
         what = "a folder" if path.is_dir() else "an empty file" if path.exists() else "no such file"
         raise refusal(path, what, "a log")
     if dialect not in (AUTO, *DIALECTS):
-        raise LogFileError(
-            f"log format: found {dialect!r}; {accepted_names(dialect, (*DIALECTS, AUTO))}"
-        )
+        accepted = accepted_names(dialect, (*DIALECTS, AUTO))
+        raise LogFileError(f"log format: found {dialect!r}; {accepted}")
     name = dialect if dialect != AUTO else recognise(path)[0]
     if not name and facts.mapping is None and not facts.robot_cables:
         raise LogFileError(

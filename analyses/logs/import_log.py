@@ -39,13 +39,11 @@ def checked_units(units: Mapping[str, str]) -> dict[str, str]:
     for dimension, unit in units.items():
         known = [name for name, (of, _) in UNITS.items() if of == dimension]
         if not known:
-            raise LogFileError(
-                f"unit: found {dimension!r}; {accepted_names(dimension, DIMENSIONS)}"
-            )
+            accepted = accepted_names(dimension, DIMENSIONS)
+            raise LogFileError(f"unit: found {dimension!r}; {accepted}")
         if unit.lower() not in known:
-            raise LogFileError(
-                f"unit of {dimension}: found {unit!r}; {accepted_names(unit, known)}"
-            )
+            accepted = accepted_names(unit, known)
+            raise LogFileError(f"unit of {dimension}: found {unit!r}; {accepted}")
         checked[dimension] = unit.lower()
     return checked
 

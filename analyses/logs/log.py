@@ -44,6 +44,12 @@ def refusal(place: object, value: object, accepted: object) -> LogFileError:
     return LogFileError(f"{place}: found {value}; accepted: {accepted}")
 
 
+def unreadable(path: Path, kind: str, problem: Exception) -> LogFileError:
+    """The error of a damaged file, in the words of the library that reads its kind."""
+    words = " ".join(str(problem).split())[:160] or type(problem).__name__
+    return LogFileError(f"{path}: cannot be read as {kind}: {words}")
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Facts:
     """What a user says of a log beside its file.
@@ -79,10 +85,8 @@ class Facts:
             LogFileError: Another number of names was given.
         """
         if self.cables is not None and len(self.cables) != count:
-            raise LogFileError(
-                f"{path}: cables: found {count} in the log and {len(self.cables)} names "
-                f"({', '.join(self.cables)[:80]}); accepted: a name for each"
-            )
+            named = f"{len(self.cables)} names ({', '.join(self.cables)[:80]})"
+            raise refusal(f"{path}: cables", f"{count} in the log and {named}", "a name for each")
         return list(self.cables or default or [f"C{k + 1}" for k in range(count)])
 
     def factor(self, dimension: str) -> float | None:

@@ -20,7 +20,6 @@ from cdpr_drake.analyses.logs.columns import (
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import read_cells
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import LogFileError
 
 _LOOKED = 20
 """Lines by which a file is recognised."""
@@ -68,10 +67,9 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
         for name, rows in tables.items():
             wide = [row for row in rows if len(row) != len(shown[name])]
             if wide or len(rows) > len(motors):
-                raise LogFileError(
-                    f"{path}: {name}: found {len(rows)} rows of {len((wide or rows)[0])}; "
-                    f"accepted: at most {len(motors)} of {len(shown[name])}"
-                )
+                words = f"{len(rows)} rows of {len((wide or rows)[0])}"
+                accepted = f"at most {len(motors)} of {len(shown[name])}"
+                raise refusal(f"{path}: {name}", words, accepted)
             if rows:
                 rows += [[""] * len(shown[name])] * (len(motors) - len(rows))
                 own += shown[name]
@@ -117,29 +115,23 @@ def _series(path: Path, text: str, name: str) -> list[list[str]]:
         raise refusal(f"{path}: {name}", f"{len(starts)} times, in lines {places}", "once")
     if not starts:
         return []
-    depth, end = 0, len(plain)
-    for place in range(starts[0], len(plain)):
-        depth += {"[": 1, "]": -1}.get(plain[place], 0)
-        if depth == 0:
-            end = place
-            break
-    else:
+    depths = np.cumsum([{"[": 1, "]": -1}.get(sign, 0) for sign in plain[starts[0] :]])
+    if depths.all():
         raise refusal(f"{path}: {name}", "brackets that do not close", "[[...], ...]")
+    begin, end = starts[0] + 1, starts[0] + int(np.argmin(depths != 0))
     rows = []
-    for found in re.finditer(r"\[([^\[\]]*)\]", plain[starts[0] + 1 : end]):
+    for found in re.finditer(r"\[([^\[\]]*)\]", plain[begin:end]):
         cells = [cell.strip() for cell in found[1].strip().rstrip(",").split(",")]
         for k, cell in enumerate(cells):
             signs = re.match(r"[+\-\s]*", cell)[0]  # type: ignore[index]
             word = ("-" if signs.count("-") % 2 else "") + cell[len(signs) :]
             if cell.count("-") - signs.count("-") > 1 or not word or not is_number(word):
-                line = plain.count("\n", 0, starts[0] + 1 + found.start(1)) + 1
-                raise LogFileError(
-                    f"{path}:{line}: {name}: found {cell[:40]!r}; accepted: numbers, or nan where "
-                    "nothing was measured"
-                )
+                line = plain.count("\n", 0, begin + found.start(1)) + 1
+                accepted = "numbers, or nan where nothing was measured"
+                raise refusal(f"{path}:{line}: {name}", repr(cell[:40]), accepted)
             cells[k] = "" if word.lstrip("-").lower() == "nan" else word
         rows.append(cells)
-    if not rows and plain[starts[0] + 1 : end].strip():
+    if not rows and plain[begin:end].strip():
         raise refusal(f"{path}: {name}", "no table of numbers", "[[...], ...]")
     return rows
 
@@ -200,10 +192,8 @@ def _belts(path: Path, number: int, words: str) -> dict[str, str]:
     for pair in words.split(","):
         name, mark, value = (part.strip().strip("\"'") for part in pair.partition(":"))
         if not mark or not value or not is_number(value) or name in belts:
-            raise LogFileError(
-                f"{path}:{number}: found {pair.strip()[:40]!r}; accepted: belts with their "
-                "lengths, each once, as bl:2376.69"
-            )
+            accepted = "belts with their lengths, each once, as bl:2376.69"
+            raise refusal(f"{path}:{number}", repr(pair.strip()[:40]), accepted)
         belts[name] = value
     return belts
 
@@ -218,11 +208,10 @@ _LAYOUTS = {
 }  # fmt: skip
 """Cells of an actuator's line by its number of cells: older recorders wrote fewer."""
 
-_UNUSED = {
-    14: "state, motor counts, motor rate, motor torque, length rate, swivel counts, swivel rate",
-    12: "state, motor counts, motor rate, motor torque, swivel counts, swivel rate",
-    11: "state, motor counts, motor rate, motor torque, swivel counts, swivel rate",
-}
+_UNUSED = ("state", "motor counts", "motor rate", "motor torque", "length rate", "swivel counts",
+           "swivel rate")  # fmt: skip
+"""What else an actuator's line has; older recorders wrote no rates of lengths."""
+
 _ACTUATOR, _INCLINOMETER, _TILT_CELLS, _MOST_ACTUATORS = "3", "5", 5, 64
 
 _JITTER = 2.5e-3
@@ -238,10 +227,8 @@ def knows_grab(head: str) -> str:
     values = all(is_number(cell) and cell.strip() for line in known for cell in line)
     if len(lines) < 2 or not widths or not values or len(known) < 0.6 * len(lines):
         return ""
-    return (
-        f"its lines are type,time,... with {widths[0]} cells of actuators (3), {_TILT_CELLS} of "
-        "the inclinometer (5)"
-    )
+    words = f"{widths[0]} cells of actuators (3), {_TILT_CELLS} of the inclinometer (5)"
+    return f"its lines are type,time,... with {words}"
 
 
 def read_grab(path: Path, text: str, facts: Facts) -> Log:
@@ -306,6 +293,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
     if latest:
         late = f"{latest} lines that came up to {1e3 * _JITTER:g} ms"
         remarks.append(f"{late} after the first one of their row stand in that row")
+    unused = [name for name in _UNUSED if width in (0, 14) or name != "length rate"]
     units = {
         "lengths, swivels, tensions": "m, rad, N by the format",
         "roll, pitch, yaw": "deg by the format",
@@ -314,8 +302,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
     return assemble(
         path, "grab", knows_grab(text), columns, facts, lines=at_line, units=units, cables=names,
         remarks=remarks,
-        left_out=dict.fromkeys(_UNUSED[width or 14].split(", "), LEFT_OUT)
-        | {f"type {kind}": LEFT_OUT for kind in sorted(other)},
+        left_out=dict.fromkeys(unused + [f"type {kind}" for kind in sorted(other)], LEFT_OUT),
     )  # fmt: skip
 
 
@@ -330,14 +317,13 @@ def _line_numbers(path: Path, number: int, cells: list[str], width: int) -> list
 
 # GTGraffiti: github.com/gchenfc/cable-robot, Firmware/gerry06_mcu_only.
 
-_GRAFFITI = "mode: x y - x y | error state length speed | ..."
-
 
 def knows_graffiti(head: str) -> str:
     """Recognises lines `mode: x y - x_d y_d | error state -length rate | ...`."""
     lines = _top(head)
     known = sum(_graffiti_cells(line) is not None for line in lines)
-    return f"its lines are {_GRAFFITI}" if len(lines) > 1 and known >= 0.8 * len(lines) else ""
+    words = "its lines are mode: x y - x y | error state length speed | ..."
+    return words if len(lines) > 1 and known >= 0.8 * len(lines) else ""
 
 
 def read_graffiti(path: Path, text: str, facts: Facts) -> Log:

@@ -51,6 +51,9 @@ _SAID_OTHERWISE = "columns with words|left out, since|the unit of the forces"
 _TURN = 1e-2
 """Largest difference of the length of a quaternion from 1."""
 
+Columns = Mapping[str, Array] | pd.DataFrame
+"""Columns by name."""
+
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
@@ -149,16 +152,14 @@ class Measurements:
         time = self.time
         if time is not None and self.points is not None:
             present = np.isfinite(self.points).all(axis=1)
-            moved = np.full(self.points.shape, np.nan)
-            at, known = time + late, time[present]
-            inside = (at >= known[0]) & (at <= known[-1])
-            for axis in range(3):
-                moved[inside, axis] = np.interp(at[inside], known, self.points[present, axis])
-            return replace(self, points=moved)
+            columns = self.points[present].T
+            moved = [
+                np.interp(time + late, time[present], column, np.nan, np.nan) for column in columns
+            ]
+            return replace(self, points=np.column_stack(moved))
         if time is None or self.poses is None:
-            raise LogFileError(
-                f"{self.path}: found no {'time' if time is None else 'poses'} to shift a tracker by"
-            )
+            missing = "time" if time is None else "poses"
+            raise LogFileError(f"{self.path}: found no {missing} to shift a tracker by")
         rows = [k for k, X in enumerate(self.poses) if X is not None]
         known, poses = time[rows], [X for X in self.poses if X is not None]
         shifted = [_between(known, poses, t) for t in time + late]
@@ -240,26 +241,22 @@ def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
     frame, lost, words = _robot_columns(log, cables)
     path, count = log.path, len(frame)
     tables: dict[str, Array | None] = {}
-    for kind in (LENGTHS, ANGLES, SWIVELS, TENSIONS, TORQUES):
-        names = [f"{cable}_{CABLE_QUANTITIES[kind][0]}" for cable in cables]
-        present = set(names) & set(frame)
-        tables[kind] = _table(frame, names) if present else None
-    position = _table(frame, PARTS[POSITION])
+    for kind, (ending, _) in CABLE_QUANTITIES.items():
+        names = [f"{cable}_{ending}" for cable in cables]
+        tables[kind] = _table(frame, names) if set(names) & set(frame) else None
     kinds = [kind for kind in ROTATIONS if set(PARTS[kind]) & set(frame)]
     placed = bool(set(PARTS[POSITION]) & set(frame))
     poses = tilts = points = None
     if placed and kinds:
-        poses = poses_of(path, {str(name): frame[name].to_numpy() for name in frame})
+        poses = poses_of(path, frame)
     elif kinds and RPY in kinds:
         tilts = _table(frame, PARTS[RPY])
     elif kinds:
-        columns = {str(name): frame[name].to_numpy() for name in frame}
-        rotations = _rotations(path, kinds[0], columns)
-        tilts = np.array([
-            np.full(3, np.nan) if R is None else RollPitchYaw(R).vector() for R in rotations
-        ])  # fmt: skip
+        rotations = _rotations(path, kinds[0], frame)
+        none = np.full(3, np.nan)
+        tilts = np.array([none if R is None else RollPitchYaw(R).vector() for R in rotations])
     elif placed:
-        points = position
+        points = _table(frame, PARTS[POSITION])
     ledger = log.ledger
     used = (ledger["fate"] == READ) & ~ledger["kind"].isin(_NOT_FITTED) & ~ledger["name"].isin(lost)
     unread = ledger["header"][~used & (ledger["fate"] != LEFT_OUT)].tolist()
@@ -304,7 +301,7 @@ def _robot_columns(log: Log, names: Sequence[str]) -> tuple[pd.DataFrame, set[st
     return log.frame, {f"{c}_{end}" for c in set(cables) - set(names) for end in endings}, []
 
 
-def poses_of(path: Path, columns: Mapping[str, Array]) -> list[RigidTransform | None]:
+def poses_of(path: Path, columns: Columns) -> list[RigidTransform | None]:
     """Poses of columns of positions and of a rotation; None in rows without."""
     kind = next((kind for kind in ROTATIONS if set(PARTS[kind]) & set(columns)), None)
     if kind is None:
@@ -320,7 +317,7 @@ def poses_of(path: Path, columns: Mapping[str, Array]) -> list[RigidTransform | 
     ]
 
 
-def _whole(path: Path, kind: str, columns: Mapping[str, Array]) -> Array:
+def _whole(path: Path, kind: str, columns: Columns) -> Array:
     """All parts of a kind, shape (k, n)."""
     present = [columns[name] for name in PARTS[kind] if name in columns]
     if len(present) < len(PARTS[kind]):
@@ -328,7 +325,7 @@ def _whole(path: Path, kind: str, columns: Mapping[str, Array]) -> Array:
     return np.column_stack(present)
 
 
-def _rotations(path: Path, kind: str, columns: Mapping[str, Array]) -> list[RotationMatrix | None]:
+def _rotations(path: Path, kind: str, columns: Columns) -> list[RotationMatrix | None]:
     """Rotations of each row; None in rows without."""
     table = _whole(path, kind, columns)
     if kind == QUATERNION:
@@ -336,24 +333,21 @@ def _rotations(path: Path, kind: str, columns: Mapping[str, Array]) -> list[Rota
         off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
         if len(off):
             raise refusal(f"{path}: row {off[0] + 1}: quaternion", f"length {size[off[0]]:g}", "1")
-    makers: dict[str, Callable[[Array], RotationMatrix]] = {
+    make: Callable[[Array], RotationMatrix] = {
         QUATERNION: _of_quaternion, TAIT: rotation_from_angles, TURN: rotation_from_vector,
         RPY: lambda values: RotationMatrix(RollPitchYaw(values)),
-    }  # fmt: skip
-    make = makers[kind]
+    }[kind]  # fmt: skip
     return [make(row) if np.isfinite(row).all() else None for row in table]
 
 
 def _of_quaternion(values: Array) -> RotationMatrix:
     w, x, y, z = values / float(np.linalg.norm(values))
-    R = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    return RotationMatrix.ProjectToRotationMatrix(R)
+    R = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return RotationMatrix.ProjectToRotationMatrix(np.array(R))
 
 
 def _corners(path: Path, frame: pd.DataFrame) -> dict[int, Array]:
@@ -364,8 +358,9 @@ def _corners(path: Path, frame: pd.DataFrame) -> dict[int, Array]:
         names = [f"tag{tag}_{axis}{corner}_px" for corner in (1, 2, 3, 4) for axis in "uv"]
         uv = _table(frame, names)
         seen = np.isfinite(uv).sum(axis=1)
-        if np.any((seen > 0) & (seen < 8)):
-            k = int(np.argmax((seen > 0) & (seen < 8)))
+        partly = np.flatnonzero((seen > 0) & (seen < 8))
+        if len(partly):
+            k = int(partly[0])
             raise LogFileError(
                 f"{path}: row {k + 1}: tag {tag}: found {seen[k]} of 8 coordinates of its corners; "
                 "accepted: tag{n}_u1 to u4 and v1 to v4, all or none in a row"

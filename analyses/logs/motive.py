@@ -84,8 +84,9 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
     if body:
         q = np.array([numbers(columns[name])[0] for name in PARTS[QUATERNION]])
         size = np.linalg.norm(q, axis=0)
-        if np.any(np.abs(size - 1.0) > _TURN):
-            k = int(np.argmax(np.abs(size - 1.0) > _TURN))
+        off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
+        if len(off):
+            k = off[0]
             raise refusal(f"{path}:{cells.lines[k]}: quaternion", f"length {size[k]:.4g}", "1")
     shown = [" ".join(filter(None, (names[j], parts[j], axes[j]))) for j in range(len(axes))]
     return assemble(
@@ -125,16 +126,14 @@ def _groups(path: Path, types: list[str], names: list[str], parts: list[str]) ->
     for (kind, name), present in groups.items():
         missing = [part for part in _PARTS[kind] if part not in present]
         if missing:
-            raise LogFileError(
-                f"{path}: {kind} {name!r}: found no column {', '.join(missing)}; accepted: "
-                f"{', '.join(_PARTS[kind])}"
-            )
+            words = f"no column {', '.join(missing)}"
+            raise refusal(f"{path}: {kind} {name!r}", words, ", ".join(_PARTS[kind]))
     return groups
 
 
 def _rows_with(cells: Cells, column: int) -> int:
     """Number of rows that have something in a column."""
-    return sum(1 for row in cells.rows if row[column])
+    return sum(bool(row[column]) for row in cells.rows)
 
 
 def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:

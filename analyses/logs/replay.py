@@ -74,14 +74,8 @@ MODEL_COLOR = (0.9, 0.6, 0.0, 0.45)
 
 
 class Followed(NamedTuple):
-    """The simulated robot, driven with the lengths of a log.
-
-    Attributes:
-        time: Shape (q,) [s].
-        rows: Rows of the log, shape (q,).
-        poses: X_WP, shape (q, 7).
-        tensions: Shape (q, m) [N].
-    """
+    """The simulated robot, driven with the lengths in q rows of a log: time, shape (q,) [s], rows,
+    shape (q,), poses X_WP, shape (q, 7), and tensions, shape (q, m) [N]."""
 
     time: Array
     rows: np.ndarray
@@ -367,17 +361,8 @@ def replay_log(
 
 
 def compare_log(robot: Robot, log: Log, fit_frame: bool = False) -> Replay:
-    """Puts a model's lengths, poses and tensions beside those of a log.
-
-    Args:
-        robot: The robot.
-        log: The log.
-        fit_frame: True if the tracker's frame is the one in which its positions are nearest to
-            those by lengths; else it is W.
-
-    Raises:
-        LogFileError: As `replay_log`.
-    """
+    """Puts a model's lengths, poses and tensions beside those of a log, with arguments and errors
+    of `replay_log`."""
     measured = bind_log(log, [cable.name for cable in robot.cables])
     m, k, motion, cables = len(robot.cables), measured.count, robot.motion_type(), robot.cable_set()
     nothing = np.full((k, m), np.nan)
@@ -451,10 +436,8 @@ def _poses_by_lengths(robot: Robot, lengths: Array) -> Array:
 def _fitted_frame(log: Log, poses: Array, by_lengths: Array, rows: np.ndarray) -> RigidTransform:
     """X_WF in which measured positions are nearest to those by lengths (Kabsch 1976)."""
     if np.count_nonzero(rows) < LEAST_ROWS:
-        raise LogFileError(
-            f"{log.path}: found {np.count_nonzero(rows)} rows with a pose and lengths; accepted: "
-            f"at least {LEAST_ROWS}, to fit the tracker's frame"
-        )
+        words = f"{np.count_nonzero(rows)} rows with a pose and lengths"
+        raise refusal(log.path, words, f"at least {LEAST_ROWS}, to fit the tracker's frame")
     p_F, p_W = poses[rows, 4:], by_lengths[rows, 4:]
     middle_F, middle_W = p_F.mean(axis=0), p_W.mean(axis=0)
     U, s, Vt = np.linalg.svd((p_F - middle_F).T @ (p_W - middle_W))
@@ -473,11 +456,8 @@ def _follow(replay: Replay) -> Followed:
     robot, lengths, path = replay.robot, replay.lengths, replay.log.path
     rows = np.flatnonzero(np.isfinite(lengths).all(axis=1))
     if replay.log.time is None or len(rows) < 2:
-        raise LogFileError(
-            f"{path}: found {len(rows)} rows with all lengths, and "
-            f"{'no times' if replay.log.time is None else 'times'}; accepted: at least two, with "
-            "times"
-        )
+        words = f"{len(rows)} rows with all lengths, and {'no ' * (replay.log.time is None)}times"
+        raise refusal(path, words, "at least two, with times")
     whole = np.all(np.isfinite(replay.poses), axis=1, keepdims=True)
     at = np.where(whole, replay.poses, replay.poses_by_lengths)
     known = rows[np.isfinite(at[rows]).all(axis=1)]

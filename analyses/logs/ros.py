@@ -1,4 +1,4 @@
-"""Text and bags of ROS 1 and 2: .bag, .db3, .mcap with CDR, or the folder of one.
+"""Text and bags of ROS 1 and 2: .bag, .db3, .mcap with CDR, or the folder of one; MCAP with JSON.
 
 Fields of messages are columns, named and understood as `rostopic echo -p` writes them; the one
 field of a std_msgs message bears its topic's name, such as /cable_1/length.
@@ -21,13 +21,18 @@ from cdpr_drake.analyses.logs.assembly import WORDS, Cells, assemble
 from cdpr_drake.analyses.logs.columns import (
     CABLE_QUANTITIES,
     MOST_CABLES,
+    PARTS,
+    POSITION,
+    QUATERNION,
     SECONDS,
     read_header,
 )
-from cdpr_drake.analyses.logs.log import Facts, Log
+from cdpr_drake.analyses.logs.log import Facts, Log, refusal, unreadable
+from cdpr_drake.analyses.reporting.mcap_log import TIME_KEY
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, install_words
 from cdpr_drake.numerics.clock_alignment import interpolate_rows
+from cdpr_drake.schema.json_text import load_json
 
 ROS1, SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
 
@@ -59,15 +64,7 @@ def renamed(cell: str, patterns: Headers) -> str:
 
 @dataclass
 class _Topic:
-    """Messages of a topic.
-
-    Attributes:
-        stamps: Times of their headers [ns], 0 without.
-        times: Times at which they were recorded [ns].
-        rows: Numbers by field.
-        joints: Names of joints.
-        left_out: Fates of fields that are no numbers.
-    """
+    """Messages of a topic: times of their headers, 0 without, and of the recorder [ns], numbers."""
 
     stamps: list[int] = field(default_factory=list)
     times: list[int] = field(default_factory=list)
@@ -82,22 +79,15 @@ class _Topic:
 
 
 def read_bag(path: Path, _: str, facts: Facts) -> Log:
-    """Reads numbers of all topics, or of some, at the times of the one that measures cables.
-
-    Args:
-        path: The bag.
-        facts: What the user says.
-    """
+    """Reads numbers of all topics, or of some, at the times of the one that measures cables."""
     if find_spec("rosbags") is None:
         raise LogFileError(f"{path}: needs rosbags, which is not installed; {install_words('ros')}")
     topics = _topics(path)
     missing = [name for name in facts.topics or () if name not in topics]
     chosen = {n: t for n, t in topics.items() if t.rows and n in (facts.topics or topics)}
     if missing or not any(row for topic in chosen.values() for row in topic.rows):
-        raise LogFileError(
-            f"{path}: topic: found {(missing or ['no numbers'])[0]}; accepted: some of "
-            f"{', '.join(topics)[:200] or 'a bag with messages'}"
-        )
+        accepted = f"some of {', '.join(topics)[:200] or 'a bag with messages'}"
+        raise refusal(f"{path}: topic", (missing or ["no numbers"])[0], accepted)
     headers = {
         name: {key: renamed(_header(name, key), ROS_COLUMNS) for row in topic.rows for key in row}
         for name, topic in chosen.items()
@@ -158,8 +148,7 @@ def _topics(path: Path) -> dict[str, _Topic]:
                         row[key] = value
                 topic.rows.append(row)
     except Exception as problem:  # the library raises of many kinds on damaged files
-        words = " ".join(str(problem).split())[:160] or type(problem).__name__
-        raise LogFileError(f"{path}: cannot be read as a bag of ROS: {words}") from problem
+        raise unreadable(path, "a bag of ROS", problem) from problem
     return topics
 
 
@@ -193,3 +182,87 @@ def _at(time: Array, table: Array, at: Array) -> Array:
     if len(time) < 2:
         return np.full((len(at), table.shape[1]), np.nan)
     return interpolate_rows(time, table, at)
+
+
+TRANSFORM = "foxglove.FrameTransform"
+"""Schema of poses."""
+
+Rows = dict[float, dict[str, Any]]
+
+
+def read_mcap(path: Path, _: str, facts: Facts) -> Log:
+    """Reads channels of flat objects of numbers in JSON, whose keys are headers, all of the same
+    times: those of the key `time_s`, or of the messages. A file with transforms alone tells the
+    platform's pose.
+
+    Source: mcap.dev/spec.
+    """
+    if find_spec("mcap") is None:
+        raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
+    channels, poses, other, encodings = _messages(path)
+    chosen = channels or poses
+    if not chosen and encodings & {"cdr", "ros1"}:
+        return read_bag(path, "", facts)
+    if not chosen:
+        found = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
+        raise refusal(path, found, "messages in JSON")
+    (first, rows), *rest = chosen.items()
+    times = list(rows)
+    for topic, others in rest:
+        if list(others) != times:
+            words = f"{len(others)} messages at other times than the {len(times)} of {first}"
+            raise refusal(f"{path}: {topic}", words, "the same times")
+    columns: list[tuple[str, Cells]] = [(SECONDS, np.array(times))]
+    for each in chosen.values():
+        for name in _keys(each):
+            columns.append((name, np.array([each[t].get(name, np.nan) for t in times])))
+    log = assemble(
+        path, "mcap", "it begins with the magic bytes of MCAP", columns, facts,
+        left_out=dict.fromkeys(sorted(other), "no numbers in JSON"),
+    )  # fmt: skip
+    words = f"Left out, no numbers in JSON: {', '.join(sorted(other))}."
+    return log.with_remarks(words) if other else log
+
+
+def _keys(rows: Rows) -> list[str]:
+    """All keys of a channel, in the order of the first message that has them all, else as they
+    come: what is not finite, or not known, is in no message."""
+    known = dict.fromkeys(name for row in rows.values() for name in row)
+    return list(next((row for row in rows.values() if len(row) == len(known)), known))
+
+
+def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str], set[str]]:
+    """Rows by time of channels of numbers, those of transforms, other channels, and encodings."""
+    from mcap.reader import make_reader
+
+    channels: dict[str, Rows] = {}
+    poses: dict[str, Rows] = {}
+    other, encodings = set[str](), set[str]()
+    try:
+        with path.open("rb") as stream:
+            for schema, channel, message in make_reader(stream).iter_messages():
+                encodings.add(channel.message_encoding)
+                if channel.message_encoding != "json":
+                    other.add(channel.topic)
+                    continue
+                content = load_json(message.data)
+                time = 1e-9 * message.log_time
+                if schema is not None and schema.name == TRANSFORM:
+                    name = f"{channel.topic} of {content['child_frame_id']}"
+                    poses.setdefault(name, {})[time] = _pose(content)
+                elif isinstance(content, dict) and all(
+                    value is None or type(value) in (int, float) for value in content.values()
+                ):
+                    row = {name: float(v) for name, v in content.items() if v is not None}
+                    channels.setdefault(channel.topic, {})[row.pop(TIME_KEY, time)] = row
+                else:
+                    other.add(channel.topic)
+    except Exception as problem:  # the library raises of many kinds on damaged files
+        raise unreadable(path, "MCAP", problem) from problem
+    return channels, poses, other, encodings
+
+
+def _pose(content: dict[str, Any]) -> dict[str, Any]:
+    p, q = content["translation"], content["rotation"]
+    place = dict(zip(PARTS[POSITION], (p["x"], p["y"], p["z"]), strict=True))
+    return place | dict(zip(PARTS[QUATERNION], (q["w"], q["x"], q["y"], q["z"]), strict=True))

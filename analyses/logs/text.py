@@ -84,14 +84,8 @@ def separator_of(line: str) -> str | None:
 
 
 def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 0) -> Cells:
-    """Cells of a text; lines that are empty or begin with # are left out.
-
-    Args:
-        path: The file, for messages.
-        text: Its content.
-        separator: Sign between cells; None: by the first row.
-        skip: Lines to leave out at the top.
-    """
+    """Cells of a text without lines that are empty, begin with #, or are the first ones to skip;
+    separator None: by the first row."""
     numbered = [
         (number, line)
         for number, line in enumerate(text.split("\n"), 1)
@@ -167,9 +161,8 @@ def with_mapping(facts: Facts, path: Path) -> Facts:
     except ValidationError as problem:
         key = str((*problem.errors()[0]["loc"], "columns")[0])
         if key not in _ACCEPTED:
-            raise LogFileError(
-                f"{path}: found {key!r}; {accepted_names(key, _ACCEPTED)}"
-            ) from problem
+            accepted = accepted_names(key, _ACCEPTED)
+            raise LogFileError(f"{path}: found {key!r}; {accepted}") from problem
         value = content.get(key) if isinstance(content, dict) else content
         raise refusal(f"{path}: {key}", str(value)[:80], _ACCEPTED[key]) from problem
     headers: Any = mapping.columns

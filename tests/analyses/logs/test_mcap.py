@@ -154,6 +154,6 @@ def test_what_cannot_be_is_said_in_one_line(run_folder, monkeypatch):
     np.savez(folder / "log.npz", **{**log, "time": log["time"] - 1.0})
     with pytest.raises(OutputFormatError, match="time: found -1; accepted by mcap: >= 0"):
         write(folder)
-    monkeypatch.setattr("cdpr_drake.analyses.logs.other_files.find_spec", lambda name: None)
+    monkeypatch.setattr("cdpr_drake.analyses.logs.ros.find_spec", lambda name: None)
     with pytest.raises(LogFileError, match=r"pip install '\.\[mcap\]'"):
         read_log(path)
