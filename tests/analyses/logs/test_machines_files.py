@@ -13,39 +13,12 @@ READ = 1e-9
 """Times of bags are whole nanoseconds [s]."""
 
 
-@pytest.fixture
-def write(tmp_path):
-    def written(name, text):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-        return tmp_path / name
-
-    return written
-
-
 def test_the_last_list_of_a_maslow_has_all_poses(write):
     path = write("serial.log", recorders.maslow())
     log = read_measurements(path, ["tl", "tr", "bl", "br"])
     assert log.lengths.shape == (8, 4)
     np.testing.assert_allclose(log.lengths[7], [2.78087, 1.69887, 2.3495, 1.0004])
     assert log.headers == {"cable lengths": ("bl", "br", "tr", "tl")}
-
-
-def test_poses_of_a_maslow_that_were_sent_one_by_one_and_pasted_ones(write):
-    one = "CLBM:[{bl:1,   br:2,   tr:3,   tl:4}]"
-    path = write("serial.log", f"{one}\n{one.replace('bl:1', 'bl:5')}\n")
-    assert read_log(path).frame["bl_length_m"].tolist() == [0.001, 0.005]
-    path = write("posted.txt", '[{"bl": 529.12, "br": 533.25, "tr": 533.14, "tl": 535.13},\n]\n')
-    assert read_log(path).frame["tl_length_m"].tolist() == [0.53513]
-
-
-@pytest.mark.parametrize(("text", "words"), [
-    ("CLBM:[{bl:1, br:2},{bl:1, tr:2}]", "found the belts bl, tr; accepted: bl, br"),
-    ("CLBM:[{bl:1, br:x}]", "found 'br:x'"), ("CLBM:[]\n", "found no belts"),
-    ("CLBM:[{bl:1, br:2}]\nCLBM:[{bl:3, bl:4}]", ":2: found 'bl:4'"),
-])  # fmt: skip
-def test_damaged_lists_of_a_maslow(text, words, write):
-    with pytest.raises(LogFileError, match=words):
-        read_log(write("serial.log", text))
 
 
 @pytest.mark.parametrize("cells", [11, 12])
@@ -70,32 +43,6 @@ def test_text_of_ros_has_the_times_of_the_sender(write):
     late = [late[0], *(f"{row.split(',')[0]},0,0,w,{row.split(',', 4)[4]}" for row in late[1:])]
     log = read_log(write("echo.csv", "\n".join(late) + "\n"))
     np.testing.assert_allclose(log.time, 0.01 * np.arange(6), atol=READ)
-
-
-@pytest.mark.parametrize(("cells", "steps"), [
-    (["2024-11-28T12:00:00", "2024-11-28T12:00:00.050", "2024-11-28T12:00:01"], [0, 0.05, 1]),
-    (["1732800000.5", "1732800000.75", "1732800001.5"], [0, 0.25, 1]),
-])  # fmt: skip
-def test_dates_count_from_the_first_row(cells, steps, write):
-    text = "\n".join(f"{cell},{k}" for k, cell in enumerate(cells))
-    log = read_log(write("log.csv", f"time,C1_length_m\n{text}\n"))
-    assert log.time.tolist() == steps
-    assert "times count from" in log.remarks[0]
-
-
-def test_quoted_cells_with_thousands_and_other_units(write):
-    text = '"t","tl_length_in","tr_length_in","tl_force_lbf","tr_force_kgf"\n'
-    text += '"0","2,326.5","1","10","1"\n"1","1","2","NA","null"\n'
-    log = read_log(write("log.csv", text))
-    np.testing.assert_allclose(log.frame["tl_length_m"], [0.0254 * 2326.5, 0.0254])
-    assert log.frame["tl_tension_n"][0] == pytest.approx(44.4822)
-    assert log.frame["tr_tension_n"].isna().tolist() == [False, True]
-
-
-def test_a_unit_that_is_no_unit_is_said(write):
-    log = read_log(write("log.csv", "C1_length_m,C2_length_cubit\n1,2\n"))
-    assert log.ledger["fate"].tolist() == ["read", "cubit is no unit that is known"]
-    assert "C2_length_cubit" in log.remarks[0]
 
 
 def test_a_recorder_with_seven_columns_and_its_own_units_is_one_entry(write, monkeypatch):

@@ -33,16 +33,6 @@ FILES = {
 TOLD = Facts(units={"length": "m"}, rate=100.0)
 
 
-@pytest.fixture
-def write(tmp_path):
-    def written(name, text, **more):
-        path = tmp_path / name
-        path.write_text(text, encoding="utf-8", newline="", **more)
-        return path
-
-    return written
-
-
 def test_every_reader_has_a_file_here():
     assert {*FILES, "mat", "mcap", "rosbag"} == set(DIALECTS)
 
@@ -180,38 +170,6 @@ def test_parsed_logs_of_grab(tmp_path):
         read_log(path)
 
 
-REFUSED = [
-    ("take.csv", recorders.motive(), Facts(), "Length Units: found none"),
-    ("take.csv", recorders.motive(units="Feet"), Facts(), "Length Units: found Feet"),
-    ("take.csv", recorders.motive(bodies=("One", "Two")), TOLD,
-     "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them; use body"),
-    ("take.csv", recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
-    ("take.csv", recorders.motive(40).replace("X,Y,Z,W", "W,Y,Z,W", 1), TOLD,
-     "Rigid Body 'Sled': found no column Rotation X; accepted: Position X"),
-    ("take.csv", recorders.motive(40).replace("Position,Position", "Posing,Posing"), TOLD,
-     "accepted"),
-    ("log.txt", recorders.gtgraffiti(), Facts(), "time: found no column of times; accep"),
-    ("log.txt", recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
-    ("raw.log", recorders.grab().replace("3,11.000,2", "3,11.000,1"), TOLD, "actuator 1 twice"),
-    ("raw.log", recorders.grab().replace("5,12.000,", "5,12.000,nan,"), TOLD, "found 6 cells"),
-    ("raw.log", recorders.grab().replace(",55,", ",inf,", 1), TOLD, "recognises|'inf'"),
-    ("log.csv", recorders.columns().replace("1003.500", "x"), TOLD, ":5: C1_length_mm: found 'x'"),
-    ("log.csv", recorders.columns().replace("50.000", "20.000"), TOLD, ":7: time: found 0.02 s"),
-    ("log.csv", recorders.columns().replace("C2_length", "C1_length"), TOLD, "C1_length_m twice"),
-    ("log.csv", recorders.columns().replace(",42.000", ",42.000,1"), TOLD, ":4: found 6 cells"),
-    ("s.py", recorders.hangprinter_script().replace("7431.3", "oh"), TOLD, ":11: motor_pos.*'oh'"),
-    ("s.py", recorders.hangprinter_script() * 2, TOLD, "found 2 times, in lines"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("name", "text", "asked", "words"), REFUSED)
-def test_what_is_wrong_is_said_in_one_line(name, text, asked, words, write):
-    with pytest.raises(LogFileError, match=words) as refused:
-        read_log(write(name, text), asked)
-    assert "\n" not in str(refused.value)
-    assert name in str(refused.value)
-
-
 def damaged(raw, rng):
     """A file after an accident."""
     kind = int(rng.integers(8))
@@ -285,28 +243,6 @@ def test_a_part_of_a_log(write):
 def test_axes_are_right_handed(words):
     with pytest.raises(LogFileError, match="right-handed"):
         axes_rotation(words)
-
-
-def test_a_run_s_own_log_is_read(tmp_path):
-    """It has lengths that winches count, and of the cables' paths: once these were refused."""
-    path = tmp_path / "log.csv"
-    headers = "time_s,X_WP.x_m,lengths.C1_m,lengths.C2_m,unstrained_lengths.C1_m"
-    headers += ",unstrained_lengths.C2_m"
-    path.write_text(f"{headers}\n0,0.5,1.1,1.2,1.05,1.15\n0.1,0.6,1.1,1.2,1.06,1.16\n")
-    log = read_log(path)
-    assert log.frame["C2_length_m"].tolist() == [1.15, 1.16]
-    assert "lengths.C2_m" not in log.frame
-    assert any(remark.endswith(": lengths.C1_m, lengths.C2_m") for remark in log.remarks)
-
-
-@pytest.mark.parametrize("number", ["1e300", "-1e31", "inf", "1e999999", "9" * 5000])
-def test_numbers_that_have_no_square_are_refused(number, write):
-    text = recorders.columns().replace("2000.250", number, 1)
-    assert number in text
-    with pytest.raises(
-        LogFileError, match=r"log.csv:2: C2_length_mm: found .*accepted: a number up"
-    ):
-        import_log(write("log.csv", text))
 
 
 # Figures.

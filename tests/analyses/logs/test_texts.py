@@ -1,0 +1,117 @@
+"""Texts as recorders write them: a table of what is read of them, and a table of refusals."""
+
+import numpy as np
+import pytest
+
+from cdpr_drake.analyses.logs.dialects import read_log
+from cdpr_drake.analyses.logs.log import Facts
+from cdpr_drake.analyses.logs.measurements import read_measurements
+from cdpr_drake.errors import LogFileError
+from tests.analyses.logs import recorders
+
+CABLES, TOLD, NAN = ("C1", "C2"), Facts(units={"length": "m"}, rate=100.0), np.nan
+
+HEADERS = (
+    "C1_length_m,C2_length_m", "l1,l2", "L_1 [m], L_2 [m]", "cable1_length,cable2_length",
+    "length_c1_m,length_c2_m", "length_0,length_1", "1_length_m,2_length_m",
+    "measured_lengths_C1_m,measured_lengths_C2_m",
+)  # fmt: skip
+
+BELTS = "CLBM:[{bl:1,   br:2,   tr:3,   tl:4}]"
+
+READ = [
+    *((f"{header}\n1.5,2.5\n", {"C1_length_m": [1.5], "C2_length_m": [2.5]}, "")
+      for header in HEADERS),
+    *((f"l1,l2\n1,{nothing}\n2,3\n", {"C1_length_m": [1, 2], "C2_length_m": [NAN, 3]}, "")
+      for nothing in ("nan", "NA", "null", "", "-")),
+    ("0.1 0.2 0.3 0.4\n0.5 0.6 0.7 0.8\n",
+     {"C1_length_m": [0.1, 0.5], "C2_length_m": [0.2, 0.6], "C1_swivel_rad": [0.3, 0.7],
+      "C2_swivel_rad": [0.4, 0.8]}, "no header: lengths"),
+    ("time,C1_length_m\n2024-11-28T12:00:00,0\n2024-11-28T12:00:00.050,1\n2024-11-28T12:00:01,2\n",
+     {"time_s": [0, 0.05, 1], "C1_length_m": [0, 1, 2]}, "times count from 2024-11-28T12:00:00"),
+    ("time,C1_length_m\n1732800000.5,0\n1732800000.75,1\n1732800001.5,2\n",
+     {"time_s": [0, 0.25, 1], "C1_length_m": [0, 1, 2]}, "times count from the first row"),
+    ('"t","tl_length_in","tr_length_in","tl_force_lbf","tr_force_kgf"\n'
+     '"0","2,326.5","1","10","1"\n"1","1","2","NA","null"\n',
+     {"time_s": [0, 1], "tl_length_m": [59.0931, 0.0254], "tr_length_m": [0.0254, 0.0508],
+      "tl_tension_n": [44.482216152605, NAN], "tr_tension_n": [9.80665, NAN]}, ""),
+    ("C1_length_m,C2_length_cubit\n1,2\n", {"C1_length_m": [1], "C2_length_cubit": [2]},
+     "kept as it is: C2_length_cubit, cubit is no unit that is known"),
+    # A run's own log: lengths that winches count, and of the cables' paths, once refused.
+    ("time_s,X_WP.x_m,lengths.C1_m,lengths.C2_m,unstrained_lengths.C1_m,unstrained_lengths.C2_m\n"
+     "0,0.5,1.1,1.2,1.05,1.15\n0.1,0.6,1.1,1.2,1.06,1.16\n",
+     {"time_s": [0, 0.1], "x_m": [0.5, 0.6], "C1_length_m": [1.05, 1.06],
+      "C2_length_m": [1.15, 1.16]}, ": lengths.C1_m, lengths.C2_m"),
+    (f"{BELTS}\n{BELTS.replace('bl:1', 'bl:5')}\n",
+     {f"{belt}_length_m": [1e-3 * k, 1e-3 * (5 if k == 1 else k)]
+      for k, belt in enumerate(("bl", "br", "tr", "tl"), 1)}, ""),
+    ('[{"bl": 529.12, "br": 533.25, "tr": 533.14, "tl": 535.13},\n]\n',
+     {"bl_length_m": [0.52912], "br_length_m": [0.53325], "tr_length_m": [0.53314],
+      "tl_length_m": [0.53513]}, ""),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "columns", "words"), READ)
+def test_a_text_has_these_columns_and_remarks(text, columns, words, write):
+    log = read_log(write("log.txt", text), Facts(robot_cables=CABLES))
+    assert list(log.frame) == list(columns)
+    for name, values in columns.items():
+        np.testing.assert_allclose(log.frame[name], values, rtol=1e-13)
+    assert words in "; ".join(log.remarks)
+    assert bool(words) == bool(log.remarks)
+
+
+BOUND = Facts()
+"""Read as measurements of two cables."""
+
+REFUSED = [
+    (recorders.motive(), Facts(), "Length Units: found none"),
+    (recorders.motive(units="Feet"), Facts(), "Length Units: found Feet"),
+    (recorders.motive(bodies=("One", "Two")), TOLD,
+     "found 'One' .1484 rows., 'Two' .1484 rows.; accepted: one of them; use body"),
+    (recorders.motive().replace("Quaternion", "XYZ"), TOLD, "Rotation Type: found XYZ"),
+    (recorders.motive(40).replace("X,Y,Z,W", "W,Y,Z,W", 1), TOLD,
+     "Rigid Body 'Sled': found no column Rotation X; accepted: Position X"),
+    (recorders.motive(40).replace("Position,Position", "Posing,Posing"), TOLD, "accepted"),
+    (recorders.gtgraffiti(), Facts(), "time: found no column of times; accep"),
+    (recorders.gtgraffiti().replace("2: 1.9", "2: oh", 1), TOLD, ":.*: found '2: oh"),
+    (recorders.grab().replace("3,11.000,2", "3,11.000,1"), TOLD, "actuator 1 twice"),
+    (recorders.grab().replace("5,12.000,", "5,12.000,nan,"), TOLD, "found 6 cells"),
+    (recorders.grab().replace(",55,", ",inf,", 1), TOLD, "recognises|'inf'"),
+    (recorders.columns().replace("1003.500", "x"), TOLD, ":5: C1_length_mm: found 'x'"),
+    (recorders.columns().replace("50.000", "20.000"), TOLD, ":7: time: found 0.02 s"),
+    (recorders.columns().replace("C2_length", "C1_length"), TOLD, "C1_length_m twice"),
+    (recorders.columns().replace(",42.000", ",42.000,1"), TOLD, ":4: found 6 cells"),
+    *((recorders.columns().replace("2000.250", number, 1), TOLD,
+       ":2: C2_length_mm: found .*accepted: a number up")
+      for number in ("1e300", "-1e31", "inf", "1e999999", "9" * 5000)),
+    (recorders.hangprinter_script().replace("7431.3", "oh"), TOLD, ":11: motor_pos.*'oh'"),
+    (recorders.hangprinter_script() * 2, TOLD, "found 2 times, in lines"),
+    ("CLBM:[{bl:1, br:2},{bl:1, tr:2}]", TOLD, "found the belts bl, tr; accepted: bl, br"),
+    ("CLBM:[{bl:1, br:x}]", TOLD, "found 'br:x'"), ("CLBM:[]\n", TOLD, "found no belts"),
+    ("CLBM:[{bl:1, br:2}]\nCLBM:[{bl:3, bl:4}]", TOLD, ":2: found 'bl:4'"),
+    ("", BOUND, "an empty file"), ("# nothing\n\n", BOUND, "found no rows"),
+    ("l1,l2\n", BOUND, "a header without rows"), ("l1,l2\n1,inf\n", BOUND, ":2: l2: found 'inf'"),
+    ("l1,l2\n1,2\n1,x7\n", BOUND, ":3: l2: found 'x7'"), ("l1,l2\n1,2,3\n", BOUND, "found 3 cells"),
+    ("l1,C1_length_m\n1,2\n", BOUND, "twice"), ("a,b\n1,2\n", BOUND, "columns: found a, b"),
+    ("1 2 3\n", BOUND, "3 columns of numbers without a header"),
+    ("x,y,z,qw,l1\n1,2,3,1,1\n", BOUND, "quaternion: found 1 columns"),
+    ("x,y,z,qw,qx,qy,qz\n1,2,3,2,0,0,0\n", BOUND, "quaternion: found length 2"),
+    ("x,y,qw,qx,qy,qz\n1,2,1,0,0,0\n", BOUND, "position: found 2 columns"),
+    ("t,l1\n0,1\n0,2\n", BOUND, "times that grow"),
+    ("tag0_u1,tag0_v1\n1,2\n", BOUND, "2 of 8 coordinates"),
+    ("A_length_m,B_length_m,D_length_m\n1,2,3\n", BOUND,
+     "cables: found A, B, D; accepted: those of the robot"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "facts", "words"), REFUSED)
+def test_what_is_wrong_is_said_in_one_line(text, facts, words, write):
+    path = write("log.txt", text)
+    with pytest.raises(LogFileError, match=words) as refused:
+        read_measurements(path, CABLES, facts) if facts is BOUND else read_log(path, facts)
+    message = str(refused.value)
+    assert "\n" not in message
+    assert "log.txt" in message
+    assert "accepted" in message
+    assert len(message) <= 500
