@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.fits.tags import read_tags
 from cdpr_drake.analyses.logs.dialects import read_log
 from cdpr_drake.analyses.logs.log import Facts
 from cdpr_drake.analyses.logs.measurements import read_measurements
-from cdpr_drake.errors import LogFileError
+from cdpr_drake.errors import CalibrationError, LogFileError
+from cdpr_drake.geometry.poses import pose_from_angles
 from tests.analyses.logs import recorders
 
 CABLES, TOLD, NAN = ("C1", "C2"), Facts(units={"length": "m"}, rate=100.0), np.nan
@@ -19,7 +21,21 @@ HEADERS = (
 
 BELTS = "CLBM:[{bl:1,   br:2,   tr:3,   tl:4}]"
 
+K, ROWS = np.arange(20), np.arange(40)
+
+OLDER = {f"C{i + 1}_length_m": 0.5 + 0.1 * i + 0.001 * ROWS for i in range(4)}
+PULLS = {f"C{i + 1}_tension_n": 29.0 + i + 0.0 * ROWS for i in range(4)}
+SWIVELS = {f"C{i + 1}_swivel_rad": 0.01 * ROWS for i in range(4)}
+STAMPS = {"time_s": 627.023 + 0.01 * ROWS}
+"""What older recorders of GRAB wrote, with tensions or without."""
+
 READ = [
+    *((recorders.columns(*signs),
+       {"time_s": 0.01 * K, "C1_length_m": 1.0005 + 1e-3 * K, "C2_length_m": 2.00025 - 1e-3 * K,
+        "C1_tension_n": 40.0 + K, "note_number": K}, "")
+      for signs in ((",", ".", "\n"), (";", ",", "\r\n"), ("\t", ".", "\r"), (";", ".", "\n"))),
+    (recorders.grab_older(11), STAMPS | OLDER | SWIVELS, "8 lines that came up to 2.5 ms"),
+    (recorders.grab_older(12), STAMPS | OLDER | PULLS | SWIVELS, "8 lines that came up to 2.5 ms"),
     *((f"{header}\n1.5,2.5\n", {"C1_length_m": [1.5], "C2_length_m": [2.5]}, "")
       for header in HEADERS),
     *((f"l1,l2\n1,{nothing}\n2,3\n", {"C1_length_m": [1, 2], "C2_length_m": [NAN, 3]}, "")
@@ -59,6 +75,64 @@ def test_a_text_has_these_columns_and_remarks(text, columns, words, write):
         np.testing.assert_allclose(log.frame[name], values, rtol=1e-13)
     assert words in "; ".join(log.remarks)
     assert bool(words) == bool(log.remarks)
+
+
+HALF = np.radians(15.0)
+TAG = ",".join(f"tag7_{axis}{corner}_px" for corner in range(1, 5) for axis in "uv")
+
+MEASURED = [
+    ("C1_length_m,roll_deg,pitch_deg,yaw_deg\n1,10,20,30\n1,,,\n", "tilts",
+     [np.radians([10.0, 20.0, 30.0]), [NAN] * 3]),
+    ("C1_length_m,pitch_rad\n1,0.2\n", "tilts", [[NAN, 0.2, NAN]]),
+    (f"C1_length_m,qw,qx,qy,qz\n1,{np.cos(HALF)},{np.sin(HALF)},0,0\n", "tilts",
+     [[2.0 * HALF, 0.0, 0.0]]),
+    ("C1_length_m,phi_deg,theta_deg,psi_deg\n1,0,0,40\n", "tilts", [[0, 0, np.radians(40.0)]]),
+    ("C1_length_m,E_length_m\n1,2\n", "lengths", [[1.0, 2.0]]),
+    (f"{TAG}\n1,2,3,4,5,6,7,8\n", "corners", np.arange(1.0, 9.0).reshape(1, 4, 2)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "field", "values"), MEASURED)
+def test_a_text_is_bound_to_two_cables(text, field, values, write):
+    """Rotations without a position are inclinations; cables of other names go by their order."""
+    log = read_measurements(write("log.csv", text), CABLES)
+    table = log.corners[7] if field == "corners" else getattr(log, field)
+    np.testing.assert_allclose(table, values, atol=1e-12)
+    assert log.poses is None
+    assert ("E_length_m" in text) == ("E is C2" in "; ".join(log.remarks))
+
+
+def test_units_separators_and_gaps(write):
+    header = "time_ms;l1_mm;tension_1 (kN);C2_swivel_deg;x_mm;y_mm;z_mm;phi_deg;theta_deg;psi_deg;n"
+    text = f"# robot\n{header}\n0;1,5;0,1;90;1;2;3;0;0;90;7\n10;;;;;;;;;;\n"
+    log = read_measurements(write("log.csv", text), CABLES)
+    np.testing.assert_allclose(log.time, [0.0, 0.01])
+    np.testing.assert_allclose(log.lengths, [[0.0015, NAN], [NAN, NAN]])
+    assert (log.tensions[0, 0], log.swivels[0, 1]) == (100.0, pytest.approx(np.pi / 2))
+    expected = pose_from_angles(np.array([0.001, 0.002, 0.003]), np.array([0, 0, np.pi / 2]))
+    assert log.poses[0].IsNearlyEqualTo(expected, 1e-12)
+    assert log.poses[1] is None
+    assert log.remarks == ("columns not read: n",)
+
+
+@pytest.mark.parametrize(("header", "row"), [
+    ("qw,qx,qy,qz", f"{np.cos(0.15):.15f},0,0,{np.sin(0.15):.15f}"), ("phi,theta,psi", "0,0,0.3"),
+    ("rx,ry,rz", "0,0,0.3"), ("roll,pitch,yaw", "0,0,0.3"),
+])  # fmt: skip
+def test_rotations_of_every_kind_agree(header, row, write):
+    log = read_measurements(write("log.csv", f"x,y,z,{header}\n1,2,3,{row}\n"), CABLES)
+    expected = pose_from_angles(np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 0.3]))
+    assert log.poses[0].IsNearlyEqualTo(expected, 1e-9)
+
+
+def test_tags_with_and_without_a_place(write):
+    header = "tag,size_mm,x_m,y_m,z_m,phi_deg,theta_deg,psi_deg"
+    tags = read_tags(write("tags.csv", f"{header}\n3,60,1,0,0,0,0,0\n4,50,,,,,,\n"))
+    assert tags[3][0] == pytest.approx(0.06)
+    assert tags[3][1].translation()[0] == 1.0
+    assert tags[4][:2] == (pytest.approx(0.05), None)
+    with pytest.raises(CalibrationError, match="size > 0"):
+        read_tags(write("tags.csv", "tag,size_m\n3,0\n"))
 
 
 BOUND = Facts()
