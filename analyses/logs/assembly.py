@@ -8,7 +8,6 @@ from dataclasses import replace
 from datetime import datetime
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,6 +20,7 @@ from cdpr_drake.analyses.logs.columns import (
     SHOWN,
     SI,
     TIME,
+    UNITS,
     Column,
     cable_names,
     first_number,
@@ -55,26 +55,19 @@ def assemble(
     units: dict[str, str] | None = None, remarks: Sequence[str] = (), cables: Sequence[str] = (),
     left_out: Mapping[str, str] | None = None, decimal: str = ".",
 ) -> Log:  # fmt: skip
-    """Makes a log of columns with headers.
+    """Makes a log of columns with headers, or refuses it.
 
     Args:
-        path: The file.
-        dialect: Name of its dialect.
-        why: How that was recognised.
+        path, dialect, why: The file, the name of its dialect, and how that was recognised.
         columns: Headers of the file, or those that its dialect gives, with their cells; a column
             without a header is left out.
-        shown: Headers as they stand in the file; None: the same.
         facts: What the user says.
+        shown: Headers as they stand in the file; None: the same.
         lines: Line of the file in which each row stands, for messages; None: rows are counted.
         units: Units in words, where the dialect fixes them; None: each column says its own.
-        remarks: Remarks of the dialect.
-        cables: Names of the cables, where the dialect has them.
+        remarks, cables: Remarks of the dialect, and names of the cables, where it has them.
         left_out: Fates by header of columns that the dialect left out.
         decimal: Mark in numbers, "." or ",".
-
-    Raises:
-        LogFileError: No column is known, two say the same, a cell is no number, or times do not
-            grow; names line and column.
     """
     headers = [header for header, _ in columns]
     names = list(cables or facts.cables or facts.robot_cables)
@@ -127,12 +120,10 @@ def assemble(
             "time_s, C1_length_m, x_m, qw, C1_tension_n and the like, or a mapping that says so"
         )
         raise refusal(f"{path}: columns", ", ".join(filter(None, headers))[:120], accepted)
-    counted = SECONDS not in frame and facts.rate is not None
-    if counted and facts.rate is not None:
+    said = dict(_unit_words(rows) if units is None else units)
+    if SECONDS not in frame and facts.rate is not None:
         count = len(next(iter(frame.values())))
         frame = {SECONDS: np.arange(count) / facts.rate, **frame}
-    said = dict(_unit_words(rows) if units is None else units)
-    if counted:
         said["time"] = f"{facts.rate:g} rows/s, {AS_TOLD}"
     if facts.R_WF is not None:
         said["axes"] = _axes_words(facts.R_WF)
@@ -228,9 +219,8 @@ def _unit(column: Column, facts: Facts, cells: Cells, fixed: bool) -> tuple[str,
         return column.unit, "header", column.factor
     if column.kind == TIME and not isinstance(cells, np.ndarray) and not is_number(cells[0]):
         return "dates", "dates", 1.0
-    factor = facts.factor(dimension)
-    if factor is not None:
-        return facts.units[dimension], "told", factor
+    if dimension in facts.units:
+        return facts.units[dimension], "told", UNITS[facts.units[dimension]][1]
     return si, "assumed", 1.0
 
 
@@ -300,10 +290,8 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
         words = f"{time[after]:.9g} s after {time[before]:.9g} s"
         accepted = "times that grow, and rows twice only where all of them is the same"
         raise refusal(f"{path}:{_place(lines, int(after))}: time", words, accepted)
-    changes: dict[str, Any] = {"repeated": int(twice.sum())}
-    if twice.any():
-        changes["frame"] = log.frame.iloc[rows].reset_index(drop=True)
-    return replace(log, **changes)
+    frame = log.frame.iloc[rows].reset_index(drop=True)
+    return replace(log, frame=frame, repeated=int(twice.sum()))
 
 
 def _place(lines: Sequence[int] | None, row: int) -> str:

@@ -11,7 +11,7 @@ stand at the functions that read them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -121,11 +121,9 @@ def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
         headers = [f"{name}_{kind}" for kind in kinds for name in names]
         remarks.append("no header: lengths [m]" + (" and swivel angles [rad]" if width > m else ""))
     else:
-        accepted = f"{m} lengths, or {m} lengths and {m} swivel angles, " if m else ""
-        raise LogFileError(
-            f"{path}: found {width} columns of numbers without a header; accepted: {accepted}a "
-            "header, or a mapping with a list of columns"
-        )
+        words = f"{width} columns of numbers without a header"
+        lengths = f"{m} lengths, or {m} lengths and {m} swivel angles, " if m else ""
+        raise refusal(path, words, f"{lengths}a header, or a mapping with a list of columns")
     read = [j for j, header in enumerate(headers) if header]
     return assemble(
         path, dialect, why, [(headers[j], [row[j] for row in rows[headed:]]) for j in read], facts,
@@ -198,11 +196,9 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
         raise LogFileError(f"log format: found {dialect!r}; {accepted}")
     name = dialect if dialect != AUTO else recognise(path)[0]
     if not name and facts.mapping is None and not facts.robot_cables:
-        raise LogFileError(
-            f"{path}: found a file that no reader of logs recognises; accepted: "
-            f"{', '.join(DIALECTS)}, named by log_format; columns of numbers without a header "
-            "need a mapping"
-        )
+        words = "a file that no reader of logs recognises"
+        numbers = "columns of numbers without a header need a mapping"
+        raise refusal(path, words, f"{', '.join(DIALECTS)}, named by log_format; {numbers}")
     how = DIALECTS[name or CSV]
     text = "" if how.binary else read_text(path)
     if dialect not in (AUTO, CSV) and not how.knows(read_bytes(path, HEAD) if how.binary else text):
@@ -232,13 +228,6 @@ def recognise(path: Path) -> tuple[str, str]:
         fits.pop(CSV, None)
     if len(fits) > 1:
         words = "; ".join(f"{name}, as {why}" for name, why in fits.items())
-        raise LogFileError(
-            f"{path}: found a file that several readers recognise: {words}; accepted: one of them, "
-            "named by log_format"
-        )
+        words = f"a file that several readers recognise: {words}"
+        raise refusal(path, words, "one of them, named by log_format")
     return next(iter(fits.items()), ("", ""))
-
-
-def formats_words() -> Sequence[str]:
-    """A line on each dialect, for the help."""
-    return [f"- {name}: {how.title}" for name, how in DIALECTS.items()]

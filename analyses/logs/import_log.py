@@ -23,14 +23,12 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.logs.clocks import join_logs, without_packets
 from cdpr_drake.analyses.logs.columns import COMMANDED, ESTIMATED, UNITS
-from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, formats_words, read_log
+from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, read_log
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import with_mapping
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, LogFileError, OutputFolderError, accepted_names
 from cdpr_drake.models.robot_loader import as_robot
-
-DIMENSIONS = tuple(sorted({dimension for dimension, _ in UNITS.values()}))
 
 
 def checked_units(units: Mapping[str, str]) -> dict[str, str]:
@@ -39,7 +37,7 @@ def checked_units(units: Mapping[str, str]) -> dict[str, str]:
     for dimension, unit in units.items():
         known = [name for name, (of, _) in UNITS.items() if of == dimension]
         if not known:
-            accepted = accepted_names(dimension, DIMENSIONS)
+            accepted = accepted_names(dimension, sorted({of for of, _ in UNITS.values()}))
             raise LogFileError(f"unit: found {dimension!r}; {accepted}")
         if unit.lower() not in known:
             accepted = accepted_names(unit, known)
@@ -57,10 +55,8 @@ def axes_rotation(word: str) -> Array:
         if name in ("x", "y", "z"):
             R[row, "xyz".index(name)] = -1.0 if part.startswith("-") else 1.0
     if len(parts) != 3 or not np.isclose(np.linalg.det(R), 1.0):
-        raise LogFileError(
-            f"axes: found {word!r}; accepted: the axes of the file that are x, y and z of W, "
-            "right-handed, as z,x,y or x,-z,y"
-        )
+        accepted = "the axes of the file that are x, y and z of W, right-handed, as z,x,y or x,-z,y"
+        raise refusal("axes", repr(word), accepted)
     return R
 
 
@@ -106,12 +102,7 @@ def facts_of(
     mapping: Path | str | None = None, rate: float | None = None, body: str | None = None,
     axes: Any = None, topic: Sequence[str] | None = None,
 ) -> Facts:  # fmt: skip
-    """What is known of a log beside its file; arguments as of `import_log`.
-
-    Raises:
-        LogFileError: A unit, a rate, axes or a mapping is not accepted, or names of cables are
-            empty or the same.
-    """
+    """What is known of a log beside its file; arguments and errors as of `import_log`."""
     if cables is not None and (not all(cables) or len(set(cables)) < len(cables)):
         raise refusal("cables", f"{', '.join(cables)!r}", "different names, as A,B,C,D")
     if rate is not None and not 0.0 < rate < np.inf:
@@ -193,7 +184,8 @@ def import_log(
     return replace(log, written=target)
 
 
-import_log.__doc__ = (import_log.__doc__ or "").replace("READERS", "\n    ".join(formats_words()))
+READERS = "\n    ".join(f"- {name}: {how.title}" for name, how in DIALECTS.items())
+import_log.__doc__ = (import_log.__doc__ or "").replace("READERS", READERS)
 
 
 def _idle(log: Log, facts: Facts) -> list[str]:

@@ -79,19 +79,11 @@ class Facts:
     robot_cables: tuple[str, ...] = ()
 
     def names(self, path: Path, count: int, default: Sequence[str] = ()) -> list[str]:
-        """Names of as many cables as a file has.
-
-        Raises:
-            LogFileError: Another number of names was given.
-        """
+        """Names of as many cables as a file has; another number of names is refused."""
         if self.cables is not None and len(self.cables) != count:
             named = f"{len(self.cables)} names ({', '.join(self.cables)[:80]})"
             raise refusal(f"{path}: cables", f"{count} in the log and {named}", "a name for each")
         return list(self.cables or default or [f"C{k + 1}" for k in range(count)])
-
-    def factor(self, dimension: str) -> float | None:
-        """Factor to SI of a dimension's unit; None if the user named no unit."""
-        return UNITS[self.units[dimension]][1] if dimension in self.units else None
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

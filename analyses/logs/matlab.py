@@ -34,9 +34,6 @@ GRAB_VARIABLES = {
 Source: github.com/fzoffoli/UACDPR_SelfCalibration, CdprViconDataHandling/CdprDataHandling.m and
 CdprViconDataHandling.m, which makes radians of epsilon_r."""
 
-_ROBOT = {"EndEffector", "Trasmission"}
-"""Fields of their robots, as the files spell them."""
-
 
 def read_mat(path: Path, _: str, facts: Facts) -> Log:
     """Reads a log of GRAB's tools, or the variables that a mapping names, as
@@ -49,7 +46,8 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
     except Exception as problem:  # scipy raises of all kinds on damaged files
         raise unreadable(path, "a file of MATLAB", problem) from problem
     variables = dict(_flat("", {k: v for k, v in content.items() if not k.startswith("__")}))
-    if {name.split(".")[1] for name in variables if "." in name} >= _ROBOT:
+    fields = {name.split(".")[1] for name in variables if "." in name}
+    if fields >= {"EndEffector", "Trasmission"}:  # as their files spell them
         raise refusal(path, "a robot of GRAB's tools", "logs; see cdpr import")
     wanted = _wanted(path, variables, facts)
     tables = {name: _table(path, name, variables[name]) for name in wanted}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -51,7 +51,7 @@ _SAID_OTHERWISE = "columns with words|left out, since|the unit of the forces"
 _TURN = 1e-2
 """Largest difference of the length of a quaternion from 1."""
 
-Columns = Mapping[str, Array] | pd.DataFrame
+Columns: TypeAlias = Mapping[str, Array] | pd.DataFrame
 """Columns by name."""
 
 
@@ -120,10 +120,8 @@ class Measurements:
         points, normal = self.points.copy(), off_plane(robot)
         for axis in np.flatnonzero(~np.isfinite(points).any(axis=0)):
             if normal is None or abs(normal[axis]) < 1.0:
-                raise LogFileError(
-                    f"{self.path}: position: found no {'xyz'[axis]}; accepted: x_m, y_m and z_m, "
-                    "or those in which the platform moves"
-                )
+                accepted = "x_m, y_m and z_m, or those in which the platform moves"
+                raise refusal(f"{self.path}: position", f"no {'xyz'[axis]}", accepted)
             present = np.isfinite(np.delete(points, axis, axis=1)).all(axis=1)
             points[present, axis] = robot.home.position[axis]
         return points
@@ -160,10 +158,9 @@ class Measurements:
         if time is None or self.poses is None:
             missing = "time" if time is None else "poses"
             raise LogFileError(f"{self.path}: found no {missing} to shift a tracker by")
-        rows = [k for k, X in enumerate(self.poses) if X is not None]
-        known, poses = time[rows], [X for X in self.poses if X is not None]
-        shifted = [_between(known, poses, t) for t in time + late]
-        return replace(self, poses=shifted)
+        times = time[[X is not None for X in self.poses]]
+        poses = [X for X in self.poses if X is not None]
+        return replace(self, poses=[_between(times, poses, t) for t in time + late])
 
 
 def _between(times: Array, poses: Sequence[RigidTransform], t: float) -> RigidTransform | None:
@@ -294,10 +291,9 @@ def _robot_columns(log: Log, names: Sequence[str]) -> tuple[pd.DataFrame, set[st
             f"cables of the log are bound to the robot's by their order: {pairs}"
         ]  # fmt: skip
     if not set(cables) & set(names):
-        raise LogFileError(
-            f"{log.path}: cables: found {', '.join(cables)[:80]}; accepted: those of the "
-            f"robot, {', '.join(names)[:120]}, or as many cables in the same order"
-        )
+        robots = f"those of the robot, {', '.join(names)[:120]}"
+        accepted = f"{robots}, or as many cables in the same order"
+        raise refusal(f"{log.path}: cables", ", ".join(cables)[:80], accepted)
     return log.frame, {f"{c}_{end}" for c in set(cables) - set(names) for end in endings}, []
 
 
@@ -361,9 +357,8 @@ def _corners(path: Path, frame: pd.DataFrame) -> dict[int, Array]:
         partly = np.flatnonzero((seen > 0) & (seen < 8))
         if len(partly):
             k = int(partly[0])
-            raise LogFileError(
-                f"{path}: row {k + 1}: tag {tag}: found {seen[k]} of 8 coordinates of its corners; "
-                "accepted: tag{n}_u1 to u4 and v1 to v4, all or none in a row"
-            )
+            words = f"{seen[k]} of 8 coordinates of its corners"
+            accepted = "tag{n}_u1 to u4 and v1 to v4, all or none in a row"
+            raise refusal(f"{path}: row {k + 1}: tag {tag}", words, accepted)
         corners[tag] = uv.reshape(-1, 4, 2)
     return corners

@@ -74,10 +74,9 @@ MODEL_COLOR = (0.9, 0.6, 0.0, 0.45)
 
 
 class Followed(NamedTuple):
-    """The simulated robot, driven with the lengths in q rows of a log: time, shape (q,) [s], rows,
-    shape (q,), poses X_WP, shape (q, 7), and tensions, shape (q, m) [N]."""
+    """The simulated robot, driven with the lengths in q rows of a log: the rows, poses X_WP, shape
+    (q, 7), and tensions, shape (q, m) [N]."""
 
-    time: Array
     rows: np.ndarray
     poses: Array
     tensions: Array
@@ -142,6 +141,14 @@ class Replay(Result):
         if self.frame is not None:
             angles = np.degrees(RollPitchYaw(self.frame.rotation()).vector()).tolist()
             frame = {"position_m": self.frame.translation().tolist(), "angles_deg": angles}
+        followed: dict[str, Any] | None = None
+        if self.followed is not None:
+            rows, apart = self.followed.rows, self.followed_distances()
+            followed = {
+                "rows": len(rows), "position_error_rms_m": _rms(apart),
+                "position_error_largest_m": _most(apart),
+                "tension_error_rms_n": _rms(self.followed.tensions - self.tensions[rows]),
+            }  # fmt: skip
         numbers: dict[str, Any] = finite({
             "robot": self.robot.name, "log": str(self.log.path), "rows": self.log.rows_summary(),
             "rows_with_pose": int(np.count_nonzero(np.isfinite(self.poses[:, 4]))),
@@ -152,16 +159,9 @@ class Replay(Result):
             "position_by_lengths_rms_m": _rms(self.distances),
             "position_by_lengths_largest_m": _most(self.distances),
             "unbalanced_force_rms_n": _rms(self.forces), "tracker_frame": frame,
+            "followed": followed, "remarks": list(self.remarks),
         })  # fmt: skip
-        followed: dict[str, Any] | None = None
-        if self.followed is not None:
-            rows, apart = self.followed.rows, self.followed_distances()
-            followed = {
-                "rows": len(rows), "position_error_rms_m": _rms(apart),
-                "position_error_largest_m": _most(apart),
-                "tension_error_rms_n": _rms(self.followed.tensions - self.tensions[rows]),
-            }  # fmt: skip
-        return {**numbers, "followed": followed, "remarks": list(self.remarks)}
+        return numbers
 
     def followed_distances(self) -> Array:
         """Distances of the simulated robot from the measured positions, shape (q,) [m]."""
@@ -223,7 +223,8 @@ class Replay(Result):
 
         distances = {"model by lengths": (self.time, 1e3 * self.distances)}
         if self.followed is not None:
-            distances["simulated"] = (self.followed.time, 1e3 * self.followed_distances())
+            times = self.time[self.followed.rows]
+            distances["simulated"] = (times, 1e3 * self.followed_distances())
         tensions = self.tensions - self.predicted_tensions
         residuals = {
             "length, measured\nminus model [mm]": by_cable(1e3 * self.length_residuals),
@@ -480,7 +481,7 @@ def _follow(replay: Replay) -> Followed:
         if k + 1 < len(rows):
             rate = (lengths[rows[k + 1]] - lengths[rows[k]]) / (time[k + 1] - time[k])
             block.GetInputPort("cable_velocities").FixValue(context, rate)
-    return Followed(replay.time[rows], rows, poses, tensions)
+    return Followed(rows, poses, tensions)
 
 
 def _mean(values: Array) -> float | None:

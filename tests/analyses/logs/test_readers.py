@@ -222,27 +222,17 @@ def test_a_bag_is_read_at_the_times_of_what_measures_cables(plugin, tmp_path):
         read_log(file)
 
 
-def damaged(raw, rng):
-    """A file after an accident."""
-    kind = int(rng.integers(8))
-    at = int(rng.integers(len(raw)))
-    if kind == 0:
-        return raw[:at]
-    if kind == 1:
-        return raw[:at] + bytes(rng.integers(0, 256, 40, dtype=np.uint8)) + raw[at:]
-    if kind == 2:
-        return raw.replace(b",", b";", int(rng.integers(1, 50)))
-    if kind == 3:
-        lines = raw.split(b"\n")
-        rng.shuffle(lines)
-        return b"\n".join(lines)
-    if kind == 4:
-        return raw.replace(b"\n", b"\r\n", int(rng.integers(1, 500)))
-    if kind == 5:
-        return raw[:at] + b"," + raw[at:]
-    if kind == 6:
-        return raw.replace(b"1", b"nan", int(rng.integers(1, 5)))
-    return raw[at:]
+ACCIDENTS = (
+    lambda raw, at, rng: raw[:at],
+    lambda raw, at, rng: raw[at:],
+    lambda raw, at, rng: raw[:at] + b"," + raw[at:],
+    lambda raw, at, rng: raw[:at] + bytes(rng.integers(0, 256, 40, dtype=np.uint8)) + raw[at:],
+    lambda raw, at, rng: b"\n".join(sorted(raw.split(b"\n"), key=lambda line: rng.random())),
+    lambda raw, at, rng: raw.replace(b",", b";", int(rng.integers(1, 50))),
+    lambda raw, at, rng: raw.replace(b"\n", b"\r\n", int(rng.integers(1, 500))),
+    lambda raw, at, rng: raw.replace(b"1", b"nan", int(rng.integers(1, 5))),
+)
+"""What happens to the bytes of a file, at a place of it."""
 
 
 @pytest.mark.parametrize("format", [*FILES, "mat"])
@@ -256,8 +246,9 @@ def test_damaged_files_are_read_or_refused(format, tmp_path):
         name, make = FILES[format]
         path = tmp_path / name
         raw = make(**({"count": 40} if format in ("gtgraffiti", "motive", "grab") else {})).encode()
-    for seed in range(60):
-        path.write_bytes(damaged(raw, np.random.default_rng(seed)))
+    for seed in range(64):
+        rng = np.random.default_rng(seed)
+        path.write_bytes(ACCIDENTS[seed % len(ACCIDENTS)](raw, int(rng.integers(len(raw))), rng))
         for how in ("auto", format):
             words, log = "", None
             try:
