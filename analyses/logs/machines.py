@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -235,11 +236,9 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
     """Reads lengths [m], swivel angles [rad], tensions, wanted tensions [N], and roll, pitch, yaw
     [deg]; one time is one row. Lengths and swivels count from where encoders were switched on.
     """
-    rows: list[dict[tuple[str, int], float]] = []
-    times: list[float] = []
+    rows: dict[float, dict[tuple[str, int], float]] = {}  # by time
     at_line: list[int] = []
-    place: dict[float, int] = {}
-    other: dict[str, int] = {}
+    other = Counter[str]()
     width = latest = 0
     for number, line in enumerate(text.split("\n"), 1):
         cells = [cell.strip() for cell in line.split(",")]
@@ -248,7 +247,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         if cells[0] not in (_ACTUATOR, _INCLINOMETER):
             if not cells[0].isdigit():
                 raise refusal(f"{path}:{number}: type", f"{cells[0][:20]!r}", "a number")
-            other[cells[0]] = other.get(cells[0], 0) + 1
+            other[cells[0]] += 1
             continue
         actuator = cells[0] == _ACTUATOR
         width = width or (len(cells) if actuator and len(cells) in _LAYOUTS else 0)
@@ -256,34 +255,33 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         key = int(values[2])
         if actuator and not (key == values[2] and 0 <= key < _MOST_ACTUATORS):
             raise refusal(f"{path}:{number}: actuator", cells[2], "a whole number from 0")
-        row = place.get(values[1])
-        if row is None and rows and actuator and width < 14:
-            near = 0.0 < values[1] - times[-1] < _JITTER and (LENGTH, key) not in rows[-1]
-            row = len(rows) - 1 if near else None
-            latest += row is not None
-        if row is None:
-            row = place[values[1]] = len(rows)
-            rows.append({})
-            times.append(values[1])
+        time = values[1]
+        if time not in rows and rows and actuator and width < 14:
+            before = next(reversed(rows))
+            if 0.0 < time - before < _JITTER and (LENGTH, key) not in rows[before]:
+                time = before
+                latest += 1
+        if time not in rows:
+            rows[time] = {}
             at_line.append(number)
-        if actuator and (LENGTH, key) in rows[row]:
+        if actuator and (LENGTH, key) in rows[time]:
             raise refusal(f"{path}:{number}", f"actuator {key} twice at {values[1]:g} s", "once")
         if actuator:
-            rows[row] |= {(what, key): values[j] for what, j in _LAYOUTS[width].items()}
+            rows[time] |= {(what, key): values[j] for what, j in _LAYOUTS[width].items()}
         else:
-            rows[row] |= {(_INCLINOMETER, k): values[2 + k] for k in range(3)}
-    keys = sorted({key for row in rows for what, key in row if what == LENGTH})
+            rows[time] |= {(_INCLINOMETER, k): values[2 + k] for k in range(3)}
+    keys = sorted({key for row in rows.values() for what, key in row if what == LENGTH})
     names = facts.names(path, len(keys))
 
     def column(what: str, key: int) -> Array:
-        return np.array([row.get((what, key), np.nan) for row in rows])
+        return np.array([row.get((what, key), np.nan) for row in rows.values()])
 
-    columns = [(SECONDS, np.array(times))]
+    columns = [(SECONDS, np.array(list(rows)))]
     for what in _LAYOUTS[width or 14]:
         header = f"{COMMANDED}{{}}_{TENSION}" if what == COMMANDED else f"{{}}_{what}"
         for name, key in zip(names, keys, strict=True):
             columns.append((header.format(name), column(what, key)))
-    if any((_INCLINOMETER, 0) in row for row in rows):
+    if any((_INCLINOMETER, 0) in row for row in rows.values()):
         angles = ("roll_deg", "pitch_deg", "yaw_deg")
         columns += [(angle, column(_INCLINOMETER, k)) for k, angle in enumerate(angles)]
     remarks = ["lengths and swivel angles count from where the encoders were switched on"]

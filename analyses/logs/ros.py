@@ -29,7 +29,6 @@ from cdpr_drake.analyses.logs.columns import (
 )
 from cdpr_drake.analyses.logs.log import Facts, Log, refusal, unreadable
 from cdpr_drake.analyses.reporting.mcap_log import TIME_KEY
-from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError, install_words
 from cdpr_drake.numerics.clock_alignment import interpolate_rows
 from cdpr_drake.schema.json_text import load_json
@@ -109,7 +108,9 @@ def read_bag(path: Path, _: str, facts: Facts) -> Log:
         keys = [key for key, header in headers[name].items() if header]
         table = np.array([[row.get(key, np.nan) for key in keys] for row in topic.rows])
         if name != first:
-            table = _at(1e-9 * (topic.clock() - start), table, at)
+            time = 1e-9 * (topic.clock() - start)
+            lonely = np.full((len(at), table.shape[1]), np.nan)
+            table = interpolate_rows(time, table, at) if len(time) > 1 else lonely
             remarks.append(f"{name} is read between its messages, at the times of {first}")
         columns += [(headers[name][key], column) for key, column in zip(keys, table.T, strict=True)]
         shown += [f"{name}/{key}" for key in keys]
@@ -175,13 +176,6 @@ def _header(topic: str, key: str) -> str:
     if key == "data" or key.startswith("data["):
         return topic.strip("/").replace("/", "_") + key.removeprefix("data").strip("[]")
     return key
-
-
-def _at(time: Array, table: Array, at: Array) -> Array:
-    """Columns of a topic at the times of another one."""
-    if len(time) < 2:
-        return np.full((len(at), table.shape[1]), np.nan)
-    return interpolate_rows(time, table, at)
 
 
 TRANSFORM = "foxglove.FrameTransform"

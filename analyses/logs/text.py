@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -23,15 +23,8 @@ SEPARATORS = (";", "\t", ",")
 """Signs between cells; where none of them is, blanks are."""
 
 
-@dataclass(frozen=True)
-class Cells:
-    """Cells of a text, all rows as long as the first.
-
-    Attributes:
-        rows: The cells.
-        lines: Line of the file in which each row stands.
-        decimal: Mark in numbers, "." or ",".
-    """
+class Cells(NamedTuple):
+    """Rows of cells, all as long as the first, the line of each, and the mark in numbers."""
 
     rows: list[list[str]]
     lines: list[int]
