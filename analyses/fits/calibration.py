@@ -107,8 +107,7 @@ HomeOrPose = Annotated[
           "home, x,y,z [m] or x,y,z,phi,theta,psi [m, deg]", "home|X,Y,Z[,PHI,THETA,PSI]"),
 ]  # fmt: skip
 ImageSize = Annotated[
-    tuple[int, int] | None,
-    words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT"),
+    tuple[int, int] | None, words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT")
 ]
 Unknowns = Annotated[str | Sequence[str] | None, comma_words()]
 NextCount = Annotated[int | None, whole(1, MOST_NEXT, "COUNT", "--next")]

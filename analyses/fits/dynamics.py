@@ -8,10 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cdpr_drake.analyses.fits.fit import (
-    fitted_robot,
-    refuse_late_tracker,
-)
+from cdpr_drake.analyses.fits.fit import fitted_robot, refuse_late_tracker
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
