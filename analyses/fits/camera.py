@@ -123,10 +123,7 @@ def calibrate_camera(
         "model": model, "hold_out": hold_out, "keep_outliers": keep_outliers, "name": name,
         "rate": rate,
     }  # fmt: skip
-    return kept_fit(
-        f"camera-{name}", arguments, work, folder=folder, overwrite=overwrite, formats=formats,
-        follow=follow,
-    )  # fmt: skip
+    return kept_fit(f"camera-{name}", arguments, work, folder, overwrite, formats, follow)
 
 
 def find_boards(
