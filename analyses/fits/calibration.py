@@ -492,7 +492,7 @@ def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
     notes += [("from the prior alone", words) for words in result.prior_only]
     if calibration.held is not None:
         notes.append(("held out", calibration.held.words()))
-    tables += notes_table([*notes, *(("remark", words) for words in remarks)])
+    tables += notes_table(remarks, notes)
     if result.outliers:
         title = f"Outliers, {len(result.outliers)}, which did not count"
         tables.append(Table(title, headings, _off_rows(result.outliers[:MOST_OUTLIERS])))

@@ -221,7 +221,7 @@ def _camera_fit(fit: CameraFit, camera: Camera, empty: Sequence[str]) -> Fit:
                 for view in fit.views
             ],
         },
-        shown=(*_tables(fit, unknowns), *notes_table([("remark", line) for line in remarks])),
+        shown=(*_tables(fit, unknowns), *notes_table(remarks)),
         drawings={"camera": lambda: _figure(fit)},
     )  # fmt: skip
 

@@ -203,10 +203,7 @@ def kept_fit(
         name: Name of a new folder below runs/, if none is given and `follow` keeps results.
         arguments: All that the results depend on, for JSON.
         work: Computes the fit.
-        folder: The folder.
-        overwrite: True if other results in the folder may be replaced.
-        formats: Formats of figures.
-        follow: Who follows.
+        folder, overwrite, formats, follow: As of each verb.
 
     Raises:
         OutputFolderError: The folder holds other results or files, or cannot be written.
@@ -233,9 +230,10 @@ def group_names(groups: str | Sequence[str]) -> tuple[str, ...]:
     return (groups,) if isinstance(groups, str) else tuple(groups)
 
 
-def notes_table(notes: Sequence[tuple[str, str]]) -> list[Table]:
-    """A table of notes, each with a word for what it is; none without notes."""
-    return [Table("To know", ("what", "which"), notes)] if notes else []
+def notes_table(remarks: Sequence[str], notes: Sequence[tuple[str, str]] = ()) -> list[Table]:
+    """A table of notes, each with a word for what it is, and of remarks; none without either."""
+    rows = [*notes, *(("remark", words) for words in remarks)]
+    return [Table("To know", ("what", "which"), rows)] if rows else []
 
 
 def fitted_robot(

@@ -170,10 +170,7 @@ def identification_fit(identification: Identification, truth: DynamicModel | Non
             "bounds": list(result.active), "equations_weighted_down": result.outliers,
             "steps": result.steps, "wall_time_s": result.wall_time,
         },
-        shown=(
-            *_tables(identification, unknowns),
-            *notes_table([("remark", line) for line in remarks]),
-        ),
+        shown=(*_tables(identification, unknowns), *notes_table(remarks)),
         drawings={
             "validation": lambda: _wrench_figure(identification),
             "parameters": lambda: parameter_figure(unknowns, compared=truth is not None),

@@ -296,7 +296,7 @@ def _tables(
         Table("Modes about rest [Hz]", ("robot", *"123456"), [
             (title, *(f"{frequency:.3f}" for frequency in row)) for title, row in modes
         ]),
-        *notes_table([("remark", line) for line in motion.remarks]),
+        *notes_table(motion.remarks),
     ]  # fmt: skip
 
 
