@@ -54,7 +54,7 @@ from cdpr_drake.geometry.poses import (
 )
 from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
 from cdpr_drake.identification.parameters import DynamicModel
-from cdpr_drake.identification.regressor import central_parameters
+from cdpr_drake.identification.regressor import central_parameters, six_of
 from cdpr_drake.models.materials import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import load_robot
@@ -295,12 +295,9 @@ def campaign_robots(scenario: TensionScenario, random: np.random.Generator) -> t
     model = dynamic_model(believed)
     load = PAYLOAD_SHARE * model.mass
     place = believed.box_center() + 0.5 * believed.platform.size * random.uniform(-1.0, 1.0, 3)
-    point = np.outer(np.append(place, 1.0), np.append(place, 1.0))
-    second = load * point[:3, :3]
+    second = load * np.outer(place, place)
     spread = np.trace(second) * np.eye(3) - second
-    pi = model.inertial() + np.concatenate(
-        [[load], load * place, np.diag(spread), [spread[0, 1], spread[0, 2], spread[1, 2]]]
-    )
+    pi = model.inertial() + np.concatenate([[load], load * place, six_of(spread)])
     mass, center, inertia = central_parameters(pi)
     cables = []
     for cable in believed.cables:
