@@ -344,13 +344,6 @@ def calibration_fit(calibration: Calibration) -> Fit:
                "dropped": one.dropped}
         for kind, one in result.residuals.items()
     }  # fmt: skip
-    drawings = {
-        "calibration": lambda: _figure("fit_figure", fit, grouped(result)),
-        "correlation": lambda: _figure("correlation_figure", fit),
-    }
-    motion = setup.freedom.motion
-    if calibration.held is not None or not (motion.is_free or motion.is_horizontal_body):
-        drawings["rows"] = lambda: _figure("row_figure", fit)
     values = zip(result.names, result.units, result.std, result.values, strict=True)
     fit = Fit(
         title=f"Calibration of {robot.name}", model=robot, status=result.status,
@@ -358,9 +351,16 @@ def calibration_fit(calibration: Calibration) -> Fit:
         spread=result.spread(), misfit=calibration.misfit, covariance=result.covariance,
         held_out=calibration.held, remarks=remarks, residuals=residuals,
         details=_details(calibration, residuals), shown=tuple(_tables(calibration, remarks)),
-        drawings=drawings, result=result, source=calibration,
+        result=result, source=calibration,
     )  # fmt: skip
-    return fit
+    drawings = {
+        "calibration": lambda: _figure("fit_figure", fit, grouped(result)),
+        "correlation": lambda: _figure("correlation_figure", fit),
+    }
+    motion = setup.freedom.motion
+    if calibration.held is not None or not (motion.is_free or motion.is_horizontal_body):
+        drawings["rows"] = lambda: _figure("row_figure", fit)
+    return replace(fit, drawings=drawings)
 
 
 def _figure(name: str, *arguments: Any) -> Any:
