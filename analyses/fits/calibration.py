@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.fits.fit import MISFIT, Fit, Unknown, group_names, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import (
+    MISFIT,
+    Fit,
+    Unknown,
+    group_names,
+    kept_fit,
+    log_of,
+    notes_table,
+)
 from cdpr_drake.analyses.fits.prediction import (
     EACH,
     NEXT_POSES,
@@ -60,7 +67,6 @@ from cdpr_drake.analyses.frame.words import (
     whole_pair,
     words,
 )
-from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
@@ -107,8 +113,7 @@ HomeOrPose = Annotated[
           "home, x,y,z [m] or x,y,z,phi,theta,psi [m, deg]", "home|X,Y,Z[,PHI,THETA,PSI]"),
 ]  # fmt: skip
 ImageSize = Annotated[
-    tuple[int, int] | None,
-    words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT"),
+    tuple[int, int] | None, words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT")
 ]
 Unknowns = Annotated[str | Sequence[str] | None, comma_words()]
 NextCount = Annotated[int | None, whole(1, MOST_NEXT, "COUNT", "--next")]
@@ -205,10 +210,7 @@ def calibrate(
     loaded = as_robot(robot, "calibrate")
     if tags is not None and tag_size is not None:
         raise CalibrationError("tag_size: found beside tags; accepted: one of them")
-    if isinstance(log, str | Path):
-        log = read_measurements(log, [cable.name for cable in loaded.cables])
-    if tracker_late is not None:
-        log = log.shifted(tracker_late)
+    log = log_of(loaded, log, tracker_late)
     names = default_unknown(loaded, log) if unknown is None else group_names(unknown)
     sigmas = dict(sigmas or {})
     for name in sigmas:
@@ -239,10 +241,7 @@ def calibrate(
         **vars(task), "verb": "calibrate", "robot": loaded.name, "log": str(log.path),
         "rows": log.count, "tracker_late": tracker_late, "hold_out": hold_out, "propose": propose,
     })  # fmt: skip
-    return kept_fit(
-        f"calibrate-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
-        formats=formats, follow=follow,
-    )  # fmt: skip
+    return kept_fit(f"calibrate-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 
 _SIGMAS = ", ".join(
@@ -339,27 +338,28 @@ def calibration_fit(calibration: Calibration) -> Fit:
     """A calibration as a `Fit`."""
     setup, result = calibration.setup, calibration.result
     robot, left = calibrated_robot(setup.task.robot, result, setup.mount)
+    remarks = (*calibration.remarks, *left)
+    residuals = {
+        kind: {"count": one.count, "rms_sigmas": one.rms, "largest_sigmas": one.largest,
+               "dropped": one.dropped}
+        for kind, one in result.residuals.items()
+    }  # fmt: skip
     values = zip(result.names, result.units, result.std, result.values, strict=True)
     fit = Fit(
         title=f"Calibration of {robot.name}", model=robot, status=result.status,
         unknowns=tuple(Unknown(n, unit, float(s), change=float(x)) for n, unit, s, x in values),
         spread=result.spread(), misfit=calibration.misfit, covariance=result.covariance,
-        held_out=calibration.held, remarks=(*calibration.remarks, *left),
-        residuals={
-            kind: {"count": fit.count, "rms_sigmas": fit.rms, "largest_sigmas": fit.largest,
-                   "dropped": fit.dropped}
-            for kind, fit in result.residuals.items()
-        },
+        held_out=calibration.held, remarks=remarks, residuals=residuals,
+        details=_details(calibration, residuals), shown=tuple(_tables(calibration, remarks)),
         result=result, source=calibration,
     )  # fmt: skip
-    fit = replace(
-        fit, details=_details(calibration, fit), shown=tuple(_tables(calibration, fit)),
-    )  # fmt: skip
+    drawings = {
+        "calibration": lambda: _figure("fit_figure", fit, grouped(result)),
+        "correlation": lambda: _figure("correlation_figure", fit),
+    }
     motion = setup.freedom.motion
-    drawings = {"calibration": partial(_figure, "fit_figure", fit, grouped(result)),
-                "correlation": partial(_figure, "correlation_figure", fit)}  # fmt: skip
     if calibration.held is not None or not (motion.is_free or motion.is_horizontal_body):
-        drawings["rows"] = partial(_figure, "row_figure", fit)
+        drawings["rows"] = lambda: _figure("row_figure", fit)
     return replace(fit, drawings=drawings)
 
 
@@ -369,17 +369,32 @@ def _figure(name: str, *arguments: Any) -> Any:
     return getattr(figures, name)(*arguments)
 
 
-def _details(calibration: Calibration, fit: Fit) -> dict[str, Any]:
-    """What results.json has of a calibration alone."""
+def _details(calibration: Calibration, residuals: Mapping[str, Any]) -> dict[str, Any]:
+    """What results.json has of a calibration alone; rows count from 1, poses from 0."""
     setup, result = calibration.setup, calibration.result
     task, model, names = setup.task, result.model, result.names
     details: dict[str, Any] = {
         "robot": task.robot.name,
         "log": str(task.log.path),
         "misfit": list(calibration.misfit),
-        "groups": [_group_row(group) for group in calibration.groups],
+        "groups": [
+            {
+                "test": group.test, "measurement": group.quantity,
+                "rows": [row + 1 for row in group.rows], "size": finite(group.size),
+                "std": finite(group.std), "probability": group.probability,
+                "poses_move_deviations": finite(group.moves), "misfit": group.counts,
+                "words": group.words,
+            }
+            for group in calibration.groups
+        ],
         "robust_cost": finite(result.robust_cost),
-        "largest_residuals": [_residual_row(outlier) for outlier in result.largest],
+        "largest_residuals": [
+            {
+                "row": o.pose + 1, "measurement": o.what, "residual": o.residual,
+                "unit": o.unit, "sigmas": o.sigmas,
+            }
+            for o in result.largest
+        ],
         "ties": [
             {
                 "row": tie.pose + 1, "X_WP": pose_row(tie.X_WP).tolist(),
@@ -393,7 +408,7 @@ def _details(calibration: Calibration, fit: Fit) -> dict[str, Any]:
         "poses": task.log.count,
         "chi_square": finite(result.chi_square),
         "degrees_of_freedom": result.degrees,
-        "residuals": {kind: dict(numbers) for kind, numbers in fit.residuals.items()},
+        "residuals": residuals,
         "gauge": list(result.gauge),
         "frames_hardly_told": list(result.loose),
         "known_from_priors_alone": list(result.prior_only),
@@ -432,25 +447,6 @@ def _details(calibration: Calibration, fit: Fit) -> dict[str, Any]:
     return details
 
 
-def _group_row(group: GroupFault) -> dict[str, Any]:
-    """A group of measurements that does not agree, for JSON; rows count from 1."""
-    return {
-        "test": group.test, "measurement": group.quantity,
-        "rows": [row + 1 for row in group.rows], "size": finite(group.size),
-        "std": finite(group.std), "probability": group.probability,
-        "poses_move_deviations": finite(group.moves), "misfit": group.counts,
-        "words": group.words,
-    }  # fmt: skip
-
-
-def _residual_row(outlier: Outlier) -> dict[str, Any]:
-    """A measurement that does not fit, for JSON; rows count from 1."""
-    return {
-        "row": outlier.pose + 1, "measurement": outlier.what, "residual": outlier.residual,
-        "unit": outlier.unit, "sigmas": outlier.sigmas,
-    }  # fmt: skip
-
-
 def grouped(result: CalibrationResult) -> list[tuple[str, str, Array, Array]]:
     """Group, unit, changes and standard deviations of the unknown parameters."""
     rows = []
@@ -466,21 +462,22 @@ def grouped(result: CalibrationResult) -> list[tuple[str, str, Array, Array]]:
     return rows
 
 
-def _tables(calibration: Calibration, fit: Fit) -> list[Table]:
+def _tables(calibration: Calibration, remarks: Sequence[str]) -> list[Table]:
     """Fit, reasons why it is none, parameters by group, notes, outliers, ties."""
     result, ties = calibration.result, calibration.ties
-    poses = calibration.setup.task.log.count
+    task = calibration.setup.task
     tables = [
         Table(
-            f"{fit.model.name}: {fit.status}, {poses} poses, residuals {fit.spread:.2f} sigmas",
+            f"{task.robot.name}: {result.status}, {task.log.count} poses, "
+            f"residuals {result.spread():.2f} sigmas",
             ("measured", "numbers", "rms [sigmas]", "largest [sigmas]", "dropped"),
             [(kind, str(one.count), f"{one.rms:.2f}", f"{one.largest:.2f}", str(one.dropped))
              for kind, one in result.residuals.items()],
         )
     ]  # fmt: skip
     headings = ("row", "measurement", "off by", "sigmas")
-    if fit.misfit:
-        why = "; ".join(words for words in fit.misfit if not words.startswith("largest: "))
+    if calibration.misfit:
+        why = "; ".join(words for words in calibration.misfit if not words.startswith("largest: "))
         tables.append(Table(f"Does not fit: {why}", headings, _off_rows(result.largest)))
     tables.append(
         Table(
@@ -495,7 +492,7 @@ def _tables(calibration: Calibration, fit: Fit) -> list[Table]:
     notes += [("from the prior alone", words) for words in result.prior_only]
     if calibration.held is not None:
         notes.append(("held out", calibration.held.words()))
-    tables += notes_table([*notes, *(("remark", words) for words in fit.remarks)])
+    tables += notes_table(remarks, notes)
     if result.outliers:
         title = f"Outliers, {len(result.outliers)}, which did not count"
         tables.append(Table(title, headings, _off_rows(result.outliers[:MOST_OUTLIERS])))

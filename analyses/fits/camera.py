@@ -123,10 +123,7 @@ def calibrate_camera(
         "model": model, "hold_out": hold_out, "keep_outliers": keep_outliers, "name": name,
         "rate": rate,
     }  # fmt: skip
-    return kept_fit(
-        f"camera-{name}", arguments, work, folder=folder, overwrite=overwrite, formats=formats,
-        follow=follow,
-    )  # fmt: skip
+    return kept_fit(f"camera-{name}", arguments, work, folder, overwrite, formats, follow)
 
 
 def find_boards(
@@ -224,7 +221,7 @@ def _camera_fit(fit: CameraFit, camera: Camera, empty: Sequence[str]) -> Fit:
                 for view in fit.views
             ],
         },
-        shown=(*_tables(fit, unknowns), *notes_table([("remark", line) for line in remarks])),
+        shown=(*_tables(fit, unknowns), *notes_table(remarks)),
         drawings={"camera": lambda: _figure(fit)},
     )  # fmt: skip
 

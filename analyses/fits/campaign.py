@@ -385,10 +385,7 @@ def calibrate_campaign(
         "verb": "calibrate_campaign", "scenario": loaded, "poses": goals or count,
         "propose": propose,
     })  # fmt: skip
-    return kept_fit(
-        f"campaign-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
-        formats=formats, follow=follow,
-    )  # fmt: skip
+    return kept_fit(f"campaign-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 
 def _campaign_fit(

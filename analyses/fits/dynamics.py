@@ -8,10 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cdpr_drake.analyses.fits.fit import (
-    fitted_robot,
-    refuse_late_tracker,
-)
+from cdpr_drake.analyses.fits.fit import fitted_robot, refuse_late_tracker
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
@@ -131,11 +128,11 @@ def fit_dynamics(
     task: IdentificationTask, log: Measurements, validate: Measurements | None = None,
     say: Callable[[str], None] = lambda words: None, bandwidth: float | None = None,
 ) -> Identification:  # fmt: skip
-    """Identifies a robot.
+    """Identifies a robot from the log of a motion.
 
     Args:
         task: What is identified.
-        log: The log of a motion.
+        log: The log.
         validate: The log of another motion, which is predicted and not fitted.
         say: Called with a line on what is done now.
         bandwidth: Of the smoothing [Hz]; None: `USUAL_BANDWIDTH`, less for slow logs.
@@ -263,11 +260,7 @@ class _Motion:
         return Validation(self.log, samples, predicted, misfit)
 
     def check_clock(self) -> None:
-        """Refuses poses that are out of sync with lengths or tensions.
-
-        Raises:
-            IdentificationError: They are; says by how much.
-        """
+        """Refuses poses that are out of sync with lengths or tensions."""
         task, rows, cables = self.task, self.poses, self.task.cables()
         step = float(np.median(np.diff(self.time)))
         if self.log.lengths is not None or self.log.angles is not None:
@@ -324,11 +317,7 @@ def _misfit_words(result: IdentificationResult) -> str:
 
 
 def _check_strain(result: IdentificationResult) -> None:
-    """Refuses cables that no tension lengthens, as lengths under load are.
-
-    Raises:
-        IdentificationError: There is one.
-    """
+    """Refuses cables that no tension lengthens, as lengths under load are."""
     bad = ~(np.isfinite(result.model.stiffness) & (result.model.stiffness > 0.0))
     if np.any(bad):
         name = result.model.names[int(np.argmax(bad))]
@@ -377,4 +366,4 @@ def identified_robot(robot: Robot, result: IdentificationResult) -> tuple[Robot,
                 "results.json"
             )
     changes = {"platform": platform, "cables": cables, "winch": winch}
-    return fitted_robot(robot, "Identified", result, **changes), tuple(left)
+    return fitted_robot(robot, "Identified", result.status, result.names, **changes), tuple(left)

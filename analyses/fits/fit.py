@@ -14,13 +14,11 @@ from pydrake.common.yaml import yaml_dump_typed
 from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
-from cdpr_drake.analyses.logs.measurements import Measurements
+from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import package_versions
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError, IdentificationError
-from cdpr_drake.identification.result import IdentificationResult
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.time_shift import WORSE
 
@@ -196,7 +194,7 @@ class Fit(Result):
 
 
 def kept_fit(
-    name: str, arguments: Mapping[str, Any], work: Callable[[], Fit], *,
+    name: str, arguments: Mapping[str, Any], work: Callable[[], Fit],
     folder: Path | str | None, overwrite: bool, formats: Sequence[str], follow: Follow,
 ) -> Fit:  # fmt: skip
     """A fit in its results folder, if one is kept.
@@ -205,17 +203,13 @@ def kept_fit(
         name: Name of a new folder below runs/, if none is given and `follow` keeps results.
         arguments: All that the results depend on, for JSON.
         work: Computes the fit.
-        folder: The folder.
-        overwrite: True if other results in the folder may be replaced.
-        formats: Formats of figures.
-        follow: Who follows.
+        folder, overwrite, formats, follow: As of each verb.
 
     Raises:
         OutputFolderError: The folder holds other results or files, or cannot be written.
         StoppedError: It was stopped.
     """
-    kept = f"runs/{name}"
-    with results_folder(kept, arguments, folder, overwrite, follow.results) as results:
+    with results_folder(f"runs/{name}", arguments, folder, overwrite, follow.results) as results:
         fit = work()
         if results is None:
             return fit
@@ -224,28 +218,29 @@ def kept_fit(
         return fit
 
 
+def log_of(robot: Robot, log: Any, late: float | None = None) -> Measurements:
+    """A robot's log, or what is read of a file, without the delay of its tracker [s]."""
+    if isinstance(log, str | Path):
+        log = read_measurements(log, [cable.name for cable in robot.cables])
+    return log if late is None else log.shifted(late)
+
+
 def group_names(groups: str | Sequence[str]) -> tuple[str, ...]:
     """Names of groups as a tuple."""
     return (groups,) if isinstance(groups, str) else tuple(groups)
 
 
-def notes_table(notes: Sequence[tuple[str, str]]) -> list[Table]:
-    """A table of notes, each with a word for what it is; none without notes."""
-    return [Table("To know", ("what", "which"), notes)] if notes else []
+def notes_table(remarks: Sequence[str], notes: Sequence[tuple[str, str]] = ()) -> list[Table]:
+    """A table of notes, each with a word for what it is, and of remarks; none without either."""
+    rows = [*notes, *(("remark", words) for words in remarks)]
+    return [Table("To know", ("what", "which"), rows)] if rows else []
 
 
 def fitted_robot(
-    robot: Robot, done: str, result: CalibrationResult | IdentificationResult, **changes: Any
+    robot: Robot, done: str, status: str, unknowns: Sequence[Any], **changes: Any
 ) -> Robot:
-    """A robot with what was found, and words of it among what its file assumes.
-
-    Args:
-        robot: As it was believed.
-        done: What was done with it, as "Calibrated".
-        result: What was found.
-        changes: Its new fields.
-    """
-    words = f"{done}: {result.status}, {len(result.names)} parameters."
+    """A robot with changed fields, and what was done with it among what its file assumes."""
+    words = f"{done}: {status}, {len(unknowns)} parameters."
     return replace(robot, **changes, assumptions=f"{robot.assumptions} {words}".strip())
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
@@ -17,7 +16,7 @@ from cdpr_drake.analyses.fits.dynamics import (
     fit_dynamics,
     identified_robot,
 )
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, log_of, notes_table
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -31,12 +30,10 @@ from cdpr_drake.analyses.frame.words import (
     comma_words,
     named_values,
 )
-from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.identification.parameters import DynamicModel
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
 from cdpr_drake.models.robot_loader import as_robot
-from cdpr_drake.models.robot_schema import Robot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -100,8 +97,8 @@ def identify(
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
     loaded = as_robot(robot, "identify")
-    fitted = _log(loaded, log, tracker_late)
-    other = None if validate is None else _log(loaded, validate, tracker_late)
+    fitted = log_of(loaded, log, tracker_late)
+    other = None if validate is None else log_of(loaded, validate, tracker_late)
     task = IdentificationTask(
         robot=loaded, unknown=group_names(unknown), common=group_names(common),
         priors=dict(priors or {}), sigma_lengths=sigma_lengths, pulleys=pulleys,
@@ -117,26 +114,11 @@ def identify(
     def work() -> Fit:
         return identification_fit(fit_dynamics(task, fitted, other, follow.doing, bandwidth))
 
-    return kept_fit(
-        f"identify-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
-        formats=formats, follow=follow,
-    )  # fmt: skip
-
-
-def _log(robot: Robot, log: Any, late: float | None) -> Measurements:
-    """A log of the robot, without the delay of its tracker [s]."""
-    if isinstance(log, str | Path):
-        log = read_measurements(Path(log), [cable.name for cable in robot.cables])
-    return log if late is None else log.shifted(late)
+    return kept_fit(f"identify-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 
 def identification_fit(identification: Identification, truth: DynamicModel | None = None) -> Fit:
-    """The fit of an identification, with its robot, tables and figures.
-
-    Args:
-        identification: The identification.
-        truth: Dynamics of the true robot, in a simulation.
-    """
+    """The fit of an identification, beside the true robot's dynamics if it was simulated."""
     result, task = identification.result, identification.task
     fitted, validated = identification.fitted, identification.validated
     robot, left = identified_robot(task.robot, result)
@@ -188,10 +170,7 @@ def identification_fit(identification: Identification, truth: DynamicModel | Non
             "bounds": list(result.active), "equations_weighted_down": result.outliers,
             "steps": result.steps, "wall_time_s": result.wall_time,
         },
-        shown=(
-            *_tables(identification, unknowns),
-            *notes_table([("remark", line) for line in remarks]),
-        ),
+        shown=(*_tables(identification, unknowns), *notes_table(remarks)),
         drawings={
             "validation": lambda: _wrench_figure(identification),
             "parameters": lambda: parameter_figure(unknowns, compared=truth is not None),
@@ -276,12 +255,7 @@ def _wrench_figure(identification: Identification) -> Figure:
 
 
 def parameter_figure(unknowns: Sequence[Unknown], compared: bool) -> Figure:
-    """Parameters over their standard errors: their errors, or their changes.
-
-    Args:
-        unknowns: The parameters.
-        compared: True if they are compared with true values, where they have one.
-    """
+    """Parameters over their standard errors: if compared, their true errors; else their changes."""
     from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
     from cdpr_drake.palette import BOUND, nth_look
 

@@ -9,9 +9,8 @@ follows that motion again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,7 +54,7 @@ from cdpr_drake.geometry.poses import (
 )
 from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
 from cdpr_drake.identification.parameters import DynamicModel
-from cdpr_drake.identification.regressor import central_parameters
+from cdpr_drake.identification.regressor import central_parameters, six_of
 from cdpr_drake.models.materials import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import load_robot
@@ -173,10 +172,8 @@ def identify_campaign(
     def work() -> Fit:
         return _campaign_fit(simulate_campaign(loaded, groups, follow))
 
-    return kept_fit(
-        f"identify-campaign-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
-        formats=formats, follow=follow,
-    )  # fmt: skip
+    name = f"identify-campaign-{loaded.name}"
+    return kept_fit(name, arguments, work, folder, overwrite, formats, follow)
 
 
 def simulate_campaign(
@@ -197,7 +194,7 @@ def simulate_campaign(
     own = scenario.trajectory.trajectory()
     logs: dict[str, Log] = {}
     for name, motion in {"excitation": excitation.trajectory, "validation": own}.items():
-        log, _ = track(scenario, true, believed, motion, partial(_tell, follow, name))
+        log, _ = _track(scenario, true, believed, motion, follow, name)
         logs[name] = recorded(log, random)
     task = IdentificationTask(
         robot=believed, unknown=unknown, pulleys=scenario.cables.pulleys,
@@ -208,7 +205,7 @@ def simulate_campaign(
     identified, _ = identified_robot(believed, identification.result)
 
     def tracking(robot: Robot) -> dict[str, float]:
-        log, failures = track(scenario, true, robot, own, partial(_tell, follow, "tracking"))
+        log, failures = _track(scenario, true, robot, own, follow, "tracking")
         distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
         return {
             "largest_m": float(np.max(distance)), "mean_m": float(np.mean(distance)),
@@ -221,10 +218,6 @@ def simulate_campaign(
         scenario, true, believed, excitation, identification, logs,
         in_turn(robots, tracking, follow, "Tracking"),
     )  # fmt: skip
-
-
-def _tell(follow: Follow, what: str, time: float) -> None:
-    follow.doing(f"{what}, {time:.0f} s")
 
 
 def _campaign_fit(campaign: DynamicCampaign) -> Fit:
@@ -302,12 +295,9 @@ def campaign_robots(scenario: TensionScenario, random: np.random.Generator) -> t
     model = dynamic_model(believed)
     load = PAYLOAD_SHARE * model.mass
     place = believed.box_center() + 0.5 * believed.platform.size * random.uniform(-1.0, 1.0, 3)
-    point = np.outer(np.append(place, 1.0), np.append(place, 1.0))
-    second = load * point[:3, :3]
+    second = load * np.outer(place, place)
     spread = np.trace(second) * np.eye(3) - second
-    pi = model.inertial() + np.concatenate(
-        [[load], load * place, np.diag(spread), [spread[0, 1], spread[0, 2], spread[1, 2]]]
-    )
+    pi = model.inertial() + np.concatenate([[load], load * place, six_of(spread)])
     mass, center, inertia = central_parameters(pi)
     cables = []
     for cable in believed.cables:
@@ -347,13 +337,10 @@ def excitation_task(scenario: TensionScenario, believed: Robot) -> ExcitationTas
     )  # fmt: skip
 
 
-def track(
-    scenario: TensionScenario,
-    true: Robot,
-    believed: Robot,
-    motion: PoseTrajectory,
-    tell: Callable[[float], None] = lambda time: None,
-) -> tuple[Log, int]:
+def _track(
+    scenario: TensionScenario, true: Robot, believed: Robot, motion: PoseTrajectory,
+    follow: Follow, what: str,
+) -> tuple[Log, int]:  # fmt: skip
     """A robot follows a motion by motor torques: its true log, and steps without tensions."""
     settings = TrackingSettings(
         gains=scenario.controller.gains(),
@@ -370,7 +357,7 @@ def track(
     loop = MotorTracking(true, believed, motion, settings)
 
     def told(time: float) -> bool:
-        tell(time)
+        follow.doing(f"{what}, {time:.0f} s")
         return True
 
     return loop.run(motion.end_time + 0.2, LOG_RATE, told), loop.failures

@@ -10,11 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analyses.logs.measurements import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, CdprError
-from cdpr_drake.geometry.poses import (
-    angles_from_rotation,
-    place_error,
-    pose_from_angles,
-)
+from cdpr_drake.geometry.poses import angles_from_rotation, place_error, pose_from_angles
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.methods import distribute

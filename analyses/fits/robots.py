@@ -96,4 +96,4 @@ def calibrated_robot(
     if any(name == "clock" or name.startswith("tilt_zero.") for name in moved):
         left.append("zeros of tilts and the tracker's clock belong to the log, as well")
     changes = {"cables": cables, "cameras": cameras, "winch": winch}
-    return fitted_robot(robot, "Calibrated", result, **changes), tuple(left)
+    return fitted_robot(robot, "Calibrated", result.status, result.names, **changes), tuple(left)

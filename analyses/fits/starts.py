@@ -47,6 +47,10 @@ MOST_REFINEMENTS = 8
 GAIN = 1e-2
 """A cost that falls by more is better."""
 
+LONG, WORTH_A_REFIT = 100, 1e-3
+"""In a log of more rows, poses that would lower the cost by less than this share of it are no
+reason to fit all rows anew."""
+
 NEAR_PLACE, NEAR_TURN = 0.02, 0.1
 """Places this near in parts of the frame's size, and turns [rad], are on their way to one
 minimum."""
@@ -162,11 +166,7 @@ def best_of_starts(setup: Setup, say: Callable[[str], None], others: bool = True
 
 
 def _from_one_pose(setup: Setup, start: StartPoint) -> Minimum | None:
-    """The minimum from all poses at the first one; None if that leads nowhere.
-
-    By a robot that is far off, poses that are sought one by one may end where cables are parallel,
-    which no step with the others leaves.
-    """
+    """The minimum from all poses at the first one, far from parallel cables; None: no minimum."""
     alike = StartPoint(start.model, [setup.first] * setup.task.log.count)
     try:
         end = setup.program(alike).Approach(MOST_STEPS).at
@@ -200,11 +200,7 @@ def _solved(
 def _on_its_way(
     setup: Setup, program: CalibrationProgram, minima: Sequence[Minimum]
 ) -> tuple[Point | None, Stations]:
-    """Where some steps lead; no point if that is no start of its own.
-
-    It is none if most poses come near those of a known minimum, or if steps run out far above all
-    of them.
-    """
+    """Where some steps lead; no point if that is near a known minimum, or far above all of them."""
     at = program.at()
     problem = program.least_squares(HUBER)
     least = min(
@@ -235,10 +231,7 @@ def _close(setup: Setup, R: Array, p: Array, S: Array, q: Array) -> npt.NDArray[
 
 
 def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minimum:
-    """The same from poses that are sought anew with the fitted robot, while better.
-
-    What counts from an unknown start puts some poses into wrong minima at first.
-    """
+    """The same from poses that are sought anew, as some first end in wrong minima; while better."""
     for _ in range(MOST_REFINEMENTS):
         rows, ends, here = _elsewhere(setup, minimum, pool, every=False)
         better = ends.costs < here[rows] - GAIN
@@ -250,6 +243,9 @@ def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minim
             if row not in best or ends.costs[n] < ends.costs[best[row]]:
                 best[row] = n
         chosen = np.array(list(best.values()))
+        gain = float(np.sum(here[rows[chosen]] - ends.costs[chosen]))
+        if len(here) > LONG and gain < WORTH_A_REFIT * minimum.cost:
+            break
         stations = minimum.result.stations.put(rows[chosen], ends.only(chosen).stations)
         start = Point(minimum.result.model, stations, minimum.program.layout)
         try:
@@ -265,17 +261,7 @@ def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minim
 def _elsewhere(
     setup: Setup, minimum: Minimum, pool: Sequence[Stations], *, every: bool
 ) -> tuple[npt.NDArray[np.intp], FoundPoses, Array]:
-    """Minima of single rows from other poses, with the fitted model.
-
-    Args:
-        setup: The problem.
-        minimum: A fit.
-        pool: Poses of other starts.
-        every: True to try turned poses of every row, not only of those that fit badly.
-
-    Returns:
-        Row of each search, shape (s,), their ends, and the costs of the fit, shape (k,).
-    """
+    """Rows of searches from other poses, (s,), their ends, and the costs of the fit, (k,)."""
     result, program, outliers = minimum.result, minimum.program, setup.task.outliers
     here, count = result.stations, result.stations.count
     at = Point(result.model, here, program.layout)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -20,7 +19,15 @@ from cdpr_drake.analyses.calibration.free_motion import (
 )
 from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
 from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import (
+    Fit,
+    Unknown,
+    fitted_robot,
+    group_names,
+    kept_fit,
+    log_of,
+    notes_table,
+)
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -36,7 +43,6 @@ from cdpr_drake.analyses.frame.words import (
     named_values,
     words,
 )
-from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
@@ -127,9 +133,7 @@ def identify_swings(
     if not 0.0 < lead < math.inf:
         raise IdentificationError(f"lead: found {lead:g}; accepted: > 0 [s]")
     deviations = _sigmas(sigmas or {})
-    measured = log
-    if isinstance(log, str | Path):
-        measured = read_measurements(Path(log), [cable.name for cable in loaded.cables])
+    measured = log_of(loaded, log)
     task = FreeMotionTask(
         robot=loaded, stretches=tuple(stretches), held_out=tuple(hold_out), sigmas=deviations,
         unknown=None if unknown is None else group_names(unknown),
@@ -147,10 +151,8 @@ def identify_swings(
         follow.doing(f"Identifying {loaded.name}")
         return swings_fit(fit_free_motion(task, measured, follow.doing))
 
-    return kept_fit(
-        f"identify-swings-{loaded.name}", arguments, work, folder=folder, overwrite=overwrite,
-        formats=formats, follow=follow,
-    )  # fmt: skip
+    name = f"identify-swings-{loaded.name}"
+    return kept_fit(name, arguments, work, folder, overwrite, formats, follow)
 
 
 def _sigmas(values: Mapping[str, float]) -> FreeSigmas:
@@ -225,8 +227,7 @@ def dominant_frequency(time: Array, values: Array) -> float:
 
 
 def _axis_frequencies(stretch: FollowedStretch) -> list[dict[str, Any]]:
-    """Dominant frequencies of turns about the sensor's axes, measured and predicted, about axes
-    with turns of at least `LARGE` of the largest; behind the lead of a predicted stretch."""
+    """Measured and predicted frequencies of `LARGE` turns, behind the lead of a stretch."""
     rows = stretch.after_lead()
     time, sizes = stretch.stretch.time[rows], np.std(stretch.measured_turns[rows], axis=0)
     frequencies = []
@@ -295,7 +296,7 @@ def _tables(
         Table("Modes about rest [Hz]", ("robot", *"123456"), [
             (title, *(f"{frequency:.3f}" for frequency in row)) for title, row in modes
         ]),
-        *notes_table([("remark", line) for line in motion.remarks]),
+        *notes_table(motion.remarks),
     ]  # fmt: skip
 
 
@@ -330,11 +331,9 @@ def swung_robot(motion: FreeMotion) -> Robot:
             creep_stiffness=law.creep_stiffness, creep_time=law.creep_time,
         )  # fmt: skip
         material = replace(material, behaviour=behaviour)
-    line = f"Identified from free motion: {motion.status}, {len(motion.unknowns)} parameters."
-    return replace(
-        robot, platform=platform, cables=cables, cable=material,
-        assumptions=f"{robot.assumptions} {line}".strip(),
-    )  # fmt: skip
+    changes = {"platform": platform, "cables": cables, "cable": material}
+    done = "Identified from free motion"
+    return fitted_robot(robot, done, motion.status, motion.unknowns, **changes)
 
 
 def _turns_figure(motion: FreeMotion, stretches: Sequence[FollowedStretch], title: str) -> Figure:
@@ -366,8 +365,7 @@ def _turns_figure(motion: FreeMotion, stretches: Sequence[FollowedStretch], titl
 
 
 def _unexplained_figure(motion: FreeMotion) -> Figure:
-    """Forces that neither cables nor weight explain, a panel a stretch, with the limit of a
-    remark."""
+    """Forces that neither cables nor weight explain, a panel a stretch, and a remark's limit."""
     from cdpr_drake.analyses.frame.figures import few_ticks, line_style, new_figure
     from cdpr_drake.palette import BOUND, nth_look
 

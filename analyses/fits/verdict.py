@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 from typing import Any
@@ -50,7 +51,8 @@ MOST_OUTLYING = 0.1
 """Outliers are many if they are a larger share of what was measured beyond what is unknown."""
 
 LEAST_SHARE, MOST_SHARE = 0.03, 0.25
-"""Offsets over lengths between which they are more likely factors."""
+"""Offsets over lengths between which they are more likely factors: lengths that change less than
+they are long hardly tell one from the other, and drums' radii are known worse than zeros."""
 
 MOST_SUSPECTS = 3
 """Sensors that are tried one by one, and exchanged in pairs."""
@@ -89,14 +91,12 @@ TILTS = ("roll", "pitch", "yaw")
 Refitted = Callable[[CalibrationTask], BestFit]
 """Calibrates anew, from one start."""
 
+Trial = tuple[str, CalibrationTask]
+"""What is changed of a task, in words, and the task."""
+
 
 def misfits(result: CalibrationResult, groups: Sequence[GroupFault] = ()) -> tuple[str, ...]:
-    """Reasons why a result does not fit the measurements, in words; empty if it does.
-
-    Args:
-        result: The result.
-        groups: Groups of its measurements that do not agree.
-    """
+    """Reasons why a result does not fit the measurements, in words; empty if it does."""
     why = [_reason(group) for group in groups if group.counts]
     if result.degrees > 0 and result.spread() > MISFIT_FACTOR:
         why.append(
@@ -222,17 +222,15 @@ def with_enlarged_deviations(
 
 def doubts(setup: Setup, best: BestFit, enlarged: Sequence[str]) -> list[str]:
     """What should be known of a fit, in words; with remarks on deviations that were enlarged."""
-    result = best.result
+    result, up = best.result, setup.first.rotation().matrix()[:, 2]
+    odd = impossible_poses(setup.task.robot, result, up)[1]
     remarks = [*setup.task.log.remarks, *unused_columns(setup)]
     for group in best.groups:
         if not group.counts:
             moves = f"; poses would move by {group.moves:.2g} of their deviations without that"
             remarks.append(group.words + (moves if np.isfinite(group.moves) else ""))
-    remarks += [*enlarged, *likely_scales(setup, result), *bad_sensors(result)]
-    remarks += many_outliers(result, best.minima)
-    remarks += impossible_poses(
-        setup.task.robot, result, setup.first.rotation().matrix()[:, 2]
-    )[1]  # fmt: skip
+    remarks += [*enlarged, *_likely_scales(setup, result), *bad_sensors(result)]
+    remarks += [*many_outliers(result, best.minima), *odd]
     remarks += [
         f"{name} is held at its bound, {value:.6g}; standard deviations are those of the others "
         "while it stays there"
@@ -248,16 +246,10 @@ def doubts(setup: Setup, best: BestFit, enlarged: Sequence[str]) -> list[str]:
     return remarks
 
 
-def likely_scales(setup: Setup, result: CalibrationResult) -> tuple[str, ...]:
-    """That offsets of lengths are more likely factors, in words.
-
-    Lengths of a cable that change less than they are long tell an offset from a factor hardly, and
-    drums' radii are known worse than zeros: an offset of 3 % of a cable is remarked. Counts that
-    begin at another length than the cable has, as those from zero, have offsets of that kind and
-    are left out.
-    """
+def _likely_scales(setup: Setup, result: CalibrationResult) -> tuple[str, ...]:
+    """That offsets of lengths are more likely factors, in words."""
     lengths, names = setup.lengths, result.names
-    if lengths is None or setup.zeroed:
+    if lengths is None or setup.zeroed:  # counts from zero have such offsets in any case
         return ()
     scales = []
     for k, cable in enumerate(setup.task.robot.cables):
@@ -370,13 +362,9 @@ def turned_sensors(task: CalibrationTask, best: BestFit, refitted: Refitted) -> 
         if kind == "inclination" and "tilt_zeros" not in task.unknown:
             unknown = (*task.unknown, "tilt_zeros")
             trials.append(("from other zeros, see tilt_zeros", replace(task, unknown=unknown)))
-        for how, trial in trials:
-            try:
-                again = refitted(trial).result
-            except CalibrationError:
-                continue
-            fit = again.residuals[kind]
-            if again.robust_cost < result.robust_cost and not is_thrown_out(fit):
+        for how, again in _fits_of(trials, refitted):
+            fit = again.result.residuals[kind]
+            if again.result.robust_cost < result.robust_cost and not is_thrown_out(fit):
                 return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit {how}",)
     return () if lost else _first_that_fits(_turned_cables(task, kinds), refitted)
 
@@ -387,13 +375,10 @@ def turned_where_lost(task: CalibrationTask, refitted: Refitted) -> tuple[str, .
     for kind, field in SIGNED.items():
         if getattr(task.log, field) is None:
             continue
-        try:
-            again = refitted(_with_sign(task, field))
-        except CalibrationError:
-            continue
-        fit = again.result.residuals.get(kind)
-        if fit is not None and not misfits(again.result, again.groups):
-            return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with the sign turned",)
+        for how, again in _fits_of([("the sign turned", _with_sign(task, field))], refitted):
+            fit = again.result.residuals.get(kind)
+            if fit is not None and not misfits(again.result, again.groups):
+                return (f"{fit.count} of {fit.count + fit.dropped} {kind} fit with {how}",)
     return _first_that_fits(_turned_cables(task, list(SIGNED)), refitted)
 
 
@@ -412,15 +397,16 @@ def _is_clear(group: GroupFault) -> bool:
     return group.counts and group.test in ("factor", "split", "row factors") and group.size > 0.0
 
 
-def _first_that_fits(
-    trials: Iterable[tuple[str, CalibrationTask]], refitted: Refitted
-) -> tuple[str, ...]:
-    """The words of the first trial that fits as a whole."""
+def _fits_of(trials: Iterable[Trial], refitted: Refitted) -> Iterator[tuple[str, BestFit]]:
+    """Trials that lead anywhere, as they are asked for."""
     for words, trial in trials:
-        try:
-            again = refitted(trial)
-        except CalibrationError:
-            continue
+        with suppress(CalibrationError):
+            yield words, refitted(trial)
+
+
+def _first_that_fits(trials: Iterable[Trial], refitted: Refitted) -> tuple[str, ...]:
+    """The words of the first trial that fits as a whole."""
+    for words, again in _fits_of(trials, refitted):
         if not misfits(again.result, again.groups):
             return (f"all fits with {words}",)
     return ()
@@ -438,9 +424,7 @@ def _with_values(task: CalibrationTask, field: str, values: Array) -> Calibratio
     return replace(task, log=replace(task.log, **changes))
 
 
-def _single_sensors(
-    task: CalibrationTask, lost: Sequence[str]
-) -> Iterator[tuple[str, CalibrationTask]]:
+def _single_sensors(task: CalibrationTask, lost: Sequence[str]) -> Iterator[Trial]:
     """Sensors by their names in words, as "roll" or "length of C1": turned, two exchanged."""
     columns: dict[str, tuple[str, str, int]] = {}
     for kind, field in SIGNED.items():
@@ -464,9 +448,7 @@ def _single_sensors(
             yield f"{what} and {other} exchanged", _with_values(task, field, values)
 
 
-def _turned_cables(
-    task: CalibrationTask, kinds: Sequence[str]
-) -> Iterator[tuple[str, CalibrationTask]]:
+def _turned_cables(task: CalibrationTask, kinds: Sequence[str]) -> Iterator[Trial]:
     """Each cable's sensor of some kinds with its sign turned."""
     for kind in kinds:
         field = SIGNED.get(kind, "tilts")
