@@ -47,10 +47,6 @@ MOST_REFINEMENTS = 8
 GAIN = 1e-2
 """A cost that falls by more is better."""
 
-LONG, WORTH_A_REFIT = 100, 1e-3
-"""In a log of more rows, poses that would lower the cost by less than this share of it are no
-reason to fit all rows anew."""
-
 NEAR_PLACE, NEAR_TURN = 0.02, 0.1
 """Places this near in parts of the frame's size, and turns [rad], are on their way to one
 minimum."""
@@ -243,9 +239,6 @@ def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minim
             if row not in best or ends.costs[n] < ends.costs[best[row]]:
                 best[row] = n
         chosen = np.array(list(best.values()))
-        gain = float(np.sum(here[rows[chosen]] - ends.costs[chosen]))
-        if len(here) > LONG and gain < WORTH_A_REFIT * minimum.cost:
-            break
         stations = minimum.result.stations.put(rows[chosen], ends.only(chosen).stations)
         start = Point(minimum.result.model, stations, minimum.program.layout)
         try:
