@@ -21,7 +21,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.analyses.calibration.logs import ROBOT, poses
+from tests.analyses.fits.logs import ROBOT, poses
 from tests.cli.commands import refuse, run, told, write_log
 
 TAGS = {
@@ -169,7 +169,7 @@ def test_what_a_robot_file_cannot_hold_is_said():
 
 
 def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
-    series = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.csv"
+    series = Path(__file__).parents[1] / "analyses/fits/hangprinter4/samples.csv"
     found = told(
         capsys, "calibrate", "hangprinter_4", series, "--zero", "home", "--sigma", "place=1e-6",
         "--unknown", "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz]",

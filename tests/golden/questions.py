@@ -95,7 +95,7 @@ def write_inputs(folder: Path) -> None:
     import numpy as np
     from pydrake.common.yaml import yaml_dump_typed
 
-    from tests.analyses.calibration import swings
+    from tests.analyses.fits import swings
     from tests.analyses.logs import recorders, test_replay
     from tests.cli import test_calibrate, test_calibrate_camera, test_identify
     from tests.cli.commands import write_log

@@ -15,7 +15,7 @@ from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.analyses.calibration.logs import ROBOT, poses, recorded, task
+from tests.analyses.fits.logs import ROBOT, poses, recorded, task
 
 FAR = pose_from_angles(np.array([1.5, -0.7, 0.4]), np.radians([20.0, -35.0, 110.0]))
 """The tracker's frame in W: a camera at the wall."""

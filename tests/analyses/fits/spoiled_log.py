@@ -1,7 +1,7 @@
 """A log of which one reading in twenty is bad, calibrated from many first poses.
 
 As a script it says how many starts end in the right minimum, and how many in others, with or
-without a word of it: `python -m tests.analyses.calibration.spoiled_log --count 200`.
+without a word of it: `python -m tests.analyses.fits.spoiled_log --count 200`.
 """
 
 import argparse

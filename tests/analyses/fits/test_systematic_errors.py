@@ -16,7 +16,7 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.calibration.attack import attacks, clean, hangprinter, outcome, scene
+from tests.analyses.fits.attack import attacks, clean, hangprinter, outcome, scene
 
 ROWS = 20
 """Of a log that is attacked."""

@@ -17,7 +17,7 @@ from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import IdentificationError, StoppedError
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.calibration import swings
+from tests.analyses.fits import swings
 from tests.messages import printed
 
 SIGMAS = 4.0

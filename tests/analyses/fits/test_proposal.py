@@ -13,7 +13,7 @@ from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.pose_design import expected_std
 from cdpr_drake.geometry.poses import pose_error
-from tests.analyses.calibration.logs import ROBOT, SIGMAS, recorded, task
+from tests.analyses.fits.logs import ROBOT, SIGMAS, recorded, task
 
 COUNT = 5
 PREDICTED = 0.03

@@ -1,6 +1,6 @@
 """How well behaviours of cables come back from many noisy swings: shares and chi-squares.
 
-    python -m tests.analyses.calibration.many_swings --seeds 100 --group creep
+    python -m tests.analyses.fits.many_swings --seeds 100 --group creep
 
 The swing is made once by Drake's plant; every seed has noise of its own, and is identified from
 what is believed beforehand.

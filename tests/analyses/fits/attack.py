@@ -1,6 +1,6 @@
 """Logs with systematic errors, and clean ones: what a calibration says of each.
 
-`python -m tests.analyses.calibration.attack` prints a table of attacks. `--clean 200` calibrates so
+`python -m tests.analyses.fits.attack` prints a table of attacks. `--clean 200` calibrates so
 many clean logs and counts false alarms. `--robot ROBOT --log LOG` attacks another log, whose clean
 fit is the truth then. `--seed` draws other poses, noise and rows. An attack is met where the
 verdict is a misfit, or a refusal, with its reason, or where poses stay within their stated

@@ -20,7 +20,7 @@ from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
 from cdpr_drake.statics.equilibrium import equilibrium_near
-from tests.analyses.calibration.many_swings import (
+from tests.analyses.fits.many_swings import (
     COUNT,
     RATE,
     START,

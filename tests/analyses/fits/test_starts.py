@@ -15,7 +15,7 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from tests.analyses.calibration import logs, spoiled_log
+from tests.analyses.fits import logs, spoiled_log
 
 
 @pytest.fixture(scope="module")

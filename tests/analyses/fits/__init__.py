@@ -1,0 +1,1 @@
+"""Tests of `cdpr_drake.analyses.fits`."""
