@@ -22,13 +22,13 @@ from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import Sigmas
 from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.calibration.measurements import simulated_poses
-from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
+from tests.analyses.fits.logs import ROBOT, inclinations, numbers, random_poses
 
 WITHIN = 3.0
 """Poses are right where their errors, the larger of turn and place, are at most so many of their
@@ -61,22 +61,6 @@ class Scene:
     options: dict
 
 
-def _some_cables(count: int) -> Robot:
-    robot = load_robot("acrobot_small")
-    return replace(robot, cables=robot.cables[:count])
-
-
-def _free_poses(count: int, random: np.random.Generator) -> list[RigidTransform]:
-    """Poses in the middle of ACROBOT's frame, in random order."""
-    return [
-        pose_from_angles(
-            np.append(random.uniform(-0.2, 0.2, 2), random.uniform(0.2, 0.6)),
-            random.uniform(-0.3, 0.3, 3),
-        )
-        for _ in range(count)
-    ]
-
-
 @cache
 def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
     """Poses at which the weight holds IRMA4U, and tensions there."""
@@ -87,7 +71,7 @@ def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
     while len(poses) < count:
         place = np.append(random.uniform(-0.4, 0.4, 2), random.uniform(0.4, 1.2))
         X_WP = pose_from_angles(place, random.uniform(-0.2, 0.2, 3))
-        lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
+        lengths = numbers(model, [X_WP])[0, :, 0]
         rest = equilibrium_near(cables, "elastic", platform, lengths, X_WP)
         if np.min(rest.tensions) > 3.0 and np.max(rest.tensions) < 300.0:
             poses.append(rest.X_WP)
@@ -101,19 +85,18 @@ def scene(
     """A simulated log: "tracked" or "blind", and the number of cables."""
     kind, cables = name[:-1], int(name[-1])
     random = np.random.default_rng([seed, cables, len(kind)])
-    tensions = None
     if cables == 4:
-        robot = load_robot("irma4u")
-        poses, tensions = _resting(count, seed)
+        robot, (poses, tensions) = load_robot("irma4u"), _resting(count, seed)
     else:
-        robot, poses = _some_cables(cables), _free_poses(count, random)
-    numbers = Point(calibration_model(robot), Stations.at(poses)).numbers
+        tensions = None
+        robot, poses = replace(ROBOT, cables=ROBOT.cables[:cables]), random_poses(random, count)
+    true = numbers(calibration_model(robot), poses)
     strain = 0.0 if tensions is None else tensions / robot.stiffness()
 
     def noisy(values: np.ndarray, sigma: float) -> np.ndarray:
         return values + sigma * random.standard_normal(values.shape)
 
-    lengths = noisy(numbers[:, :, 0] / (1.0 + strain), noise.lengths)
+    lengths = noisy(true[:, :, 0] / (1.0 + strain), noise.lengths)
     log = Measurements(Path(name), count, lengths=lengths)
     if tensions is not None:
         log = replace(log, tensions=noisy(tensions, noise.tensions))
@@ -121,9 +104,9 @@ def scene(
         seen = simulated_poses(poses, noise.turn, noise.place, random)
         asked = {"unknown": ("exit_points", "length_offsets"), "priors": {"exit_points": 0.01}}
         return Scene(robot, replace(log, poses=list(seen)), poses, {**asked, **options})
-    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    tilts = tilts + random.standard_normal(tilts.shape) * [noise.tilt, noise.tilt, noise.yaw]
-    log = replace(log, swivels=noisy(numbers[:, :, 2], noise.swivels), tilts=tilts)
+    sigmas = [noise.tilt, noise.tilt, noise.yaw]
+    tilts = inclinations(poses) + random.standard_normal((count, 3)) * sigmas
+    log = replace(log, swivels=noisy(true[:, :, 2], noise.swivels), tilts=tilts)
     asked = {} if cables == 4 else {"unknown": ("length_offsets",), "rest": False}
     return Scene(robot, log, poses, {"start": poses[0], **asked, **options})
 
