@@ -164,9 +164,10 @@ def test_what_a_robot_file_cannot_hold_is_said():
 
 def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
     said = told(
-        capsys, "calibrate", "hangprinter_4", HANGPRINTER, "--zero", "home", "--sigma", "place=1e-6",
+        capsys, "calibrate", "hangprinter_4", HANGPRINTER, "--zero", "home",
         "--unknown", "exit_points,common_drum_radius,D.drum_radius,tracker.[xyz]",
-        "--bound", "tracker.[xyz]=0.001", "--hold-out", "2-4,9", "--keep-outliers", "--out", "out",
+        "--sigma", "place=1e-6", "--bound", "tracker.[xyz]=0.001", "--hold-out", "2-4,9",
+        "--keep-outliers", "--out", "out",
     )  # fmt: skip
     assert (said["status"], said["poses"]) == ("converged", 40)
     assert said["at_bounds"] == {"tracker.x": pytest.approx(1e-3)}

@@ -7,6 +7,7 @@ import cv2
 import pytest
 
 from cdpr_drake.schema.yaml_files import load_yaml
+from tests.analyses.fits.logs import MOTION_NOISE, write_motion
 from tests.cli.commands import ended, refuse
 from tests.cli.test_fits import BOARD, LENS, K
 from tests.identification.logs import log
