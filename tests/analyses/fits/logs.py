@@ -49,6 +49,17 @@ def inclinations(poses):
     return np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
 
 
+def errors(poses, result):
+    """Distances and angles from where the platform was to where it is found, shape (k, 2)."""
+    pairs = zip(poses, result.stations.poses(), strict=True)
+    return np.array([pose_error(X, Y) for X, Y in pairs])
+
+
+def fitted(robot, log, unknown, **more):
+    """A calibration of a log."""
+    return fit_robot(CalibrationTask(robot=robot, log=log, unknown=unknown, **more))
+
+
 def recorded(true, *, count=COUNT):
     """What winches and a tracker would measure with noise of these sigmas."""
     random, at = np.random.default_rng(1), poses(count)
@@ -57,13 +68,12 @@ def recorded(true, *, count=COUNT):
     return Measurements(Path("simulated"), count, lengths=readings, poses=list(tracked))
 
 
-def task(unknown, log, priors=None, **more):
-    """A task whose first pose is believed some centimetres off."""
+def tracked_fit(unknown, log, priors=None, **more):
+    """A calibration whose first pose is believed some centimetres off."""
     start = poses()[0]
     off = RigidTransform(start.rotation(), start.translation() + np.array([0.02, -0.01, 0.01]))
-    return CalibrationTask(
-        robot=ROBOT, log=log, unknown=unknown, priors=priors or {}, sigmas=SIGMAS, start=off, **more
-    )
+    more = {"priors": priors or {}, "sigmas": SIGMAS, "start": off, **more}
+    return fitted(ROBOT, log, unknown, **more)
 
 
 # Files.
@@ -159,19 +169,13 @@ def first_pose(number):
     return RigidTransform(turn, np.clip(place, low, high))
 
 
-def blind_calibration(start, log=None):
-    """The calibration from a first pose, of the spoiled log or another."""
-    log = spoiled()[1] if log is None else log
-    return fit_robot(CalibrationTask(
-        robot=ROBOT, log=log, unknown=("length_offsets",), sigmas=BLIND, start=start, rest=False,
-    ))  # fmt: skip
+def blind_fit(start):
+    """The calibration of the spoiled log from a first pose."""
+    more = {"sigmas": BLIND, "start": start, "rest": False}
+    return fitted(ROBOT, spoiled()[1], ("length_offsets",), **more)
 
 
 def wrong_rows(calibration):
     """Rows whose pose is not where it truly was, from 0."""
-    rows, result = [], calibration.result
-    for k, (X, Y) in enumerate(zip(spoiled()[0], result.stations.poses(), strict=True)):
-        (distance, angle), (turn, place) = pose_error(X, Y), result.pose_std[k]
-        if distance > FAR * place or angle > FAR * turn:
-            rows.append(k)
-    return rows
+    off, std = errors(spoiled()[0], calibration.result), calibration.result.pose_std[:, ::-1]
+    return np.flatnonzero(np.any(off > FAR * std, axis=1)).tolist()

@@ -10,9 +10,9 @@ from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.fits import calibration
-from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
+from cdpr_drake.analyses.fits.calibration import calibration_fit
 from cdpr_drake.analyses.fits.robots import calibration_model
-from cdpr_drake.analyses.fits.setup import HOMING, CalibrationTask, Sigmas, default_unknown
+from cdpr_drake.analyses.fits.setup import HOMING, Sigmas, default_unknown
 from cdpr_drake.analyses.fits.starts import upright_minima, upside_down
 from cdpr_drake.analyses.fits.verdict import impossible_poses
 from cdpr_drake.analyses.logs.measurements import Measurements
@@ -22,12 +22,12 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from tests.analyses.fits import logs
-from tests.analyses.fits.logs import blind_calibration, first_pose, numbers, wrong_rows
+from tests.analyses.fits.logs import blind_fit, first_pose, numbers, wrong_rows
 
 
 @pytest.fixture(scope="module")
 def spoiled():
-    return blind_calibration(first_pose(0))
+    return blind_fit(first_pose(0))
 
 
 def test_a_log_with_bad_readings_ends_in_the_right_minimum(spoiled):
@@ -37,7 +37,7 @@ def test_a_log_with_bad_readings_ends_in_the_right_minimum(spoiled):
 
 
 def test_another_start_ends_in_the_same_minimum(spoiled):
-    other = blind_calibration(first_pose(1))
+    other = blind_fit(first_pose(1))
     assert wrong_rows(other) == []
     assert other.result.robust_cost == pytest.approx(spoiled.result.robust_cost, abs=1e-3)
 
@@ -62,10 +62,8 @@ def planar_log(bad, sigma=2e-4, outliers=True):
     readings = lengths + 2e-4 * random.standard_normal(lengths.shape)
     readings[8, 1] += bad
     log = Measurements(Path("plane"), 14, lengths=readings - readings[0])
-    return poses, fit_robot(CalibrationTask(
-        robot=robot, log=log, unknown=("length_offsets",), sigmas=Sigmas(lengths=sigma),
-        start=poses[0], outliers=outliers,
-    ))  # fmt: skip
+    more = {"sigmas": Sigmas(lengths=sigma), "start": poses[0], "outliers": outliers}
+    return poses, logs.fitted(robot, log, ("length_offsets",), **more)
 
 
 def test_a_row_that_fits_as_well_elsewhere_is_remarked():
@@ -84,8 +82,7 @@ def test_a_row_that_fits_as_well_elsewhere_is_remarked():
 def test_without_bad_readings_a_plane_is_found():
     poses, fit = planar_log(0.0)
     assert fit.result.outliers == fit.misfit == ()
-    for X, Y in zip(poses, fit.result.stations.poses(), strict=True):
-        assert pose_error(X, Y)[0] < 2e-3
+    assert np.max(logs.errors(poses, fit.result)[:, 0]) < 2e-3
 
 
 def test_residuals_beyond_three_sigmas_are_a_misfit_without_outliers_too(monkeypatch):
@@ -106,13 +103,9 @@ def test_an_inclinometer_holds_what_lengths_leave_open():
         tilts=logs.inclinations(poses), torques=np.zeros((6, 4)),
         headers={"rpy": ("roll_rad",), "motor torques": ("C1_torque_nm", "C2_torque_nm")},
     )  # fmt: skip
-    sigmas = Sigmas(tilt=1e-3, yaw=1e-3)
-    fit = fit_robot(
-        CalibrationTask(robot=robot, log=log, unknown=(), sigmas=sigmas, start=poses[0])
-    )
+    fit = logs.fitted(robot, log, (), sigmas=Sigmas(tilt=1e-3, yaw=1e-3), start=poses[0])
     assert fit.result.residuals["inclination"].count == 18
-    for X, Y in zip(poses, fit.result.stations.poses(), strict=True):
-        assert pose_error(X, Y)[0] < 1e-4
+    assert np.max(logs.errors(poses, fit.result)[:, 0]) < 1e-4
     assert fit.remarks[0] == (
         "not used: C1_torque_nm, C2_torque_nm: a calibration has no use of motor torques"
     )
@@ -189,9 +182,8 @@ def test_nothing_has_to_be_said(homing):
     fit = cdpr.calibrate(robot, log)
     assert fit.result.status == "converged"
     assert fit.source.setup.task.sigmas == HOMING
-    distance, angle = pose_error(poses[0], fit.result.stations.poses()[0])
-    assert distance < 5.0 * NOISE * fit.result.pose_std[0, 1]
-    assert angle < 5.0 * NOISE * fit.result.pose_std[0, 0]
+    first = logs.errors(poses, fit.result)[0]
+    assert np.all(first < 5.0 * NOISE * fit.result.pose_std[0, ::-1])
     assert fit.result.model.tilt_zero[2] == pytest.approx(YAW, abs=0.05)
     assert fit.as_dict()["tilt_zeros_rad"][:2] == [0.0, 0.0]
 
@@ -204,17 +196,14 @@ def test_three_cables_without_tension_sensors_find_where_they_began(resting):
         swivels=counted(swivels, SIGMAS.swivels, random),
     )  # fmt: skip
     start = RigidTransform([0.1, -0.1, 0.3])
-    result = fit_robot(CalibrationTask(
-        robot=three_cables(), log=log, unknown=("length_offsets",), sigmas=SIGMAS, start=start,
-    )).result  # fmt: skip
+    fit = logs.fitted(three_cables(), log, ("length_offsets",), sigmas=SIGMAS, start=start)
+    result = fit.result
     assert result.status == "converged"
     assert result.spread() < 2.0
-    far = pose_error(start, poses[0])[0]
-    for X, Y in zip(poses, result.stations.poses(), strict=True):
-        distance, angle = pose_error(X, Y)
-        assert distance < 5.0 * np.max(result.std[:3])
-        assert distance < 0.3 * far
-        assert np.degrees(angle) < 2.0
+    distance, angle = np.max(logs.errors(poses, result), axis=0)
+    assert distance < 5.0 * np.max(result.std[:3])
+    assert distance < 0.3 * pose_error(start, poses[0])[0]
+    assert np.degrees(angle) < 2.0
 
 
 def test_swivels_whose_sign_is_turned_are_named(homing):

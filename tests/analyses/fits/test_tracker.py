@@ -23,7 +23,7 @@ from cdpr_drake.errors import CalibrationError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.vision.apriltags import TagTarget
-from tests.analyses.fits.logs import ROBOT, SIGMAS, poses, recorded, task
+from tests.analyses.fits.logs import ROBOT, SIGMAS, poses, recorded, tracked_fit
 
 EXACT = calibration_model(ROBOT)
 FAR = pose_from_angles(np.array([1.5, -0.7, 0.4]), np.radians([20.0, -35.0, 110.0]))
@@ -42,7 +42,7 @@ def errors(result, true, *groups):
 @pytest.mark.parametrize("more", [{}, {"X_PM": MARKER}])
 def test_a_tracker_on_the_wall_is_found(more):
     true, unknown = replace(EXACT, X_WK=FAR, **more), ("tracker", "marker")[: 1 + len(more)]
-    result = fit_robot(task(unknown, recorded(true))).result
+    result = tracked_fit(unknown, recorded(true)).result
     assert result.status == "converged"
     assert result.gauge == result.prior_only == result.outliers == ()
     assert len(result.names) == 6 * len(unknown)
@@ -52,7 +52,7 @@ def test_a_tracker_on_the_wall_is_found(more):
 
 def test_exit_points_and_the_trackers_frame_cannot_both_be_told():
     log = recorded(replace(EXACT, X_WK=FAR))
-    calibration = fit_robot(task(("exit_points", "tracker"), log, {"exit_points": 0.01}))
+    calibration = tracked_fit(("exit_points", "tracker"), log, {"exit_points": 0.01})
     words = "translation of the world frame along "
     assert calibration.result.gauge[-3:] == (words + "x", words + "y", words + "z")
     said = calibration_fit(calibration).as_dict()
@@ -65,7 +65,7 @@ def test_drum_and_pulley_radii_come_back_by_a_tracker_of_unknown_frame():
     cables = replace(EXACT.cables, pulley_radius=EXACT.cables.pulley_radius + 5e-4)
     true = replace(EXACT, X_WK=FAR, length_scale=scale, cables=cables)
     unknown = ("length_scales", "pulley_radii", "tracker")
-    result = fit_robot(task(unknown, recorded(true))).result
+    result = tracked_fit(unknown, recorded(true)).result
     assert result.gauge == ()
     off = errors(result, true, "length_scale", "pulley_radius", "tracker")
     assert np.max(off) < MOST_SIGMAS
@@ -98,7 +98,7 @@ def test_tags_that_were_measured_so_well_pull_as_much(tmp_path):
     def fitted(third):
         """With this place of tag 3."""
         more = {"tags": tags | {3: third}, "image_size": (640, 480)}
-        return fit_robot(task(("camera",), log, **more)).result
+        return tracked_fit(("camera",), log, **more).result
 
     measured = fitted(tags[3])
     assert {name.split(".")[0] for name in measured.names} == {"camera", "tag3", "tag5"}
@@ -139,7 +139,7 @@ PREDICTED = 0.03
 @pytest.fixture(scope="module")
 def first():
     """A calibration from few poses."""
-    return fit_robot(task(("exit_points",), recorded(EXACT, count=6)))
+    return tracked_fit(("exit_points",), recorded(EXACT, count=6))
 
 
 @pytest.fixture(scope="module")
