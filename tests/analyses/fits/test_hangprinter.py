@@ -7,6 +7,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.fits.prediction import held_groups
 from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.models.robot_loader import load_robot
@@ -123,6 +124,11 @@ def test_each_known_position_is_predicted_without_it(free):
     assert free.held_out.words().startswith(
         "9 rows were not fitted but predicted by a fit on all others"
     )
+
+
+def test_rows_by_name_are_held_out():
+    (rows,) = held_groups("2-4,9", read(), zeroed=True)
+    assert rows.tolist() == [1, 2, 3, 8]
 
 
 @pytest.mark.parametrize("words", ["0", "9", "50-60", "50-99999999999", "nine", "1-9"])
