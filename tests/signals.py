@@ -136,21 +136,12 @@ COMMANDS = {
 
 def write_inputs(folder: Path) -> None:
     """What commands read: logs for calibrations and identifications, a file of a design."""
-    import numpy as np
-
-    from tests.cli import test_calibrate, test_identify
+    from tests.analyses.fits import logs
     from tests.cli.commands import write_log
     from tests.identification.logs import log
 
-    random_numbers = np.random.default_rng(1)
-    model, poses = test_calibrate.TRUE, test_calibrate.POSES
-    lengths = test_calibrate.simulated_lengths(
-        model, poses, test_calibrate.START, 1e-4, random_numbers
-    )
-    seen = test_calibrate.simulated_poses(poses, 1e-3, 5e-4, random_numbers)
-    columns = test_calibrate.length_columns(lengths) | test_calibrate.pose_columns(seen)
-    write_log(folder / "poses.csv", columns)
-    test_identify.write(folder / "motion.csv", *log(span=4.0, **test_identify.NOISE))
+    write_log(folder / "poses.csv", logs.tracked_columns(1))
+    logs.write_motion(folder / "motion.csv", *log(span=4.0, **logs.MOTION_NOISE))
     (folder / "design.yaml").write_text(
         "exit_points: {reach: [0.1, 0.1, 0.1]}\ngoals: [{name: static}]\n"
         "poses: {counts: [3, 3, 2]}\npopulation: 4\n"

@@ -12,7 +12,7 @@ from cdpr_drake.models.robot_loader import robot_text
 from cdpr_drake.systems.scenarios.files import scenario_file
 from tests.cli.commands import refuse, run
 
-SERIES = Path(__file__).parents[1] / "analyses/calibration/hangprinter4/samples.csv"
+SERIES = Path(__file__).parents[1] / "analyses/fits/hangprinter4/samples.csv"
 
 FILES = {
     "file": "", "full/old": "", "mine/thesis.tex": "x", "mine.yaml": "years of work",

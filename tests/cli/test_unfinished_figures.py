@@ -7,9 +7,9 @@ import cv2
 import pytest
 
 from cdpr_drake.schema.yaml_files import load_yaml
+from tests.analyses.fits.logs import MOTION_NOISE, write_motion
 from tests.cli.commands import ended, refuse
-from tests.cli.test_calibrate_camera import BOARD, LENS, K
-from tests.cli.test_identify import write
+from tests.cli.test_fits import BOARD, LENS, K
 from tests.identification.logs import log
 from tests.vision.boards import board_image, board_poses, make_board
 
@@ -43,7 +43,7 @@ def test_a_plan_that_ends_while_its_figures_are_drawn_is_made_again(here, monkey
 
 def fitted(folder):
     """A command that identifies a robot in a log."""
-    write(folder / "log.csv", *log(span=2.0, tension=0.3, place=1e-4, angle=2e-4))
+    write_motion(folder / "log.csv", *log(span=2.0, **MOTION_NOISE))
     return ["identify", "acrobot_large", "log.csv", "--no-pulleys", "--out", "fit"]
 
 

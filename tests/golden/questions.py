@@ -95,28 +95,31 @@ def write_inputs(folder: Path) -> None:
     import numpy as np
     from pydrake.common.yaml import yaml_dump_typed
 
-    from tests.analyses.calibration import swings
+    from cdpr_drake.calibration import measurements
+    from cdpr_drake.geometry.poses import pose_from_angles
+    from cdpr_drake.models.robot_loader import load_robot
+    from tests.analyses.fits import logs, swings
     from tests.analyses.logs import recorders, test_replay
-    from tests.cli import test_calibrate, test_calibrate_camera, test_identify
+    from tests.cli import test_fits
     from tests.cli.commands import write_log
     from tests.identification.logs import log
     from tests.vision.boards import board_image, board_poses, make_board
 
     def lengths(poses: list, deviation: float, seed: int) -> np.ndarray:
-        return test_calibrate.simulated_lengths(
-            test_calibrate.TRUE, poses, test_calibrate.START, deviation, np.random.default_rng(seed)
+        return measurements.simulated_lengths(
+            logs.TRUE, poses, logs.START, deviation, np.random.default_rng(seed)
         )
 
     def tracked(poses: list, seen: list, seed: int) -> dict[str, np.ndarray]:
-        noisy = test_calibrate.simulated_poses(seen, 1e-3, 5e-4, np.random.default_rng(seed + 1))
-        readings = test_calibrate.length_columns(lengths(poses, 1e-4, seed))
-        return readings | test_calibrate.pose_columns(noisy)
+        noisy = measurements.simulated_poses(seen, 1e-3, 5e-4, np.random.default_rng(seed + 1))
+        readings = logs.length_columns(lengths(poses, 1e-4, seed))
+        return readings | logs.pose_columns(noisy)
 
     def pose(t: float) -> object:
         place = np.array([0.1 * np.sin(t), 0.1 * np.cos(1.3 * t), 0.3 + 0.05 * np.sin(0.7 * t)])
-        return test_calibrate.pose_from_angles(place, 0.1 * np.sin(t * np.array([1.1, 0.8, 0.5])))
+        return pose_from_angles(place, 0.1 * np.sin(t * np.array([1.1, 0.8, 0.5])))
 
-    poses = test_calibrate.POSES
+    poses = logs.POSES
     columns = tracked(poses, poses, 1)
     write_log(folder / "tracked.csv", columns)
     jumps = np.random.default_rng(9)
@@ -130,13 +133,11 @@ def write_inputs(folder: Path) -> None:
     time = np.linspace(0.0, 6.0, 121)
     late = tracked([pose(t) for t in time], [pose(t - 0.2) for t in time], 5)
     write_log(folder / "late.csv", {"time_s": time} | late)
-    angles = -test_calibrate.simulated_swivels(
-        test_calibrate.TRUE, poses[:10], 2e-3, np.random.default_rng(4)
-    )
-    swivels = test_calibrate.length_columns(lengths(poses, 2e-4, 3)[:10])
+    angles = -measurements.simulated_swivels(logs.TRUE, poses[:10], 2e-3, np.random.default_rng(4))
+    swivels = logs.length_columns(lengths(poses, 2e-4, 3)[:10])
     swivels |= {f"C{k + 1}_swivel_rad": angles[:, k] for k in range(8)}
     write_log(folder / "swivels.csv", swivels)
-    nominal = test_calibrate.load_robot("acrobot_small")
+    nominal = load_robot("acrobot_small")
     for cable, shift in zip(
         nominal.cables, 0.004 * np.random.default_rng(2).standard_normal((8, 3)), strict=True
     ):
@@ -160,18 +161,16 @@ def write_inputs(folder: Path) -> None:
     }  # fmt: skip
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8", newline="")
-    noise = test_identify.NOISE
-    test_identify.write(folder / "motion.csv", *log(span=4.0, **noise))
+    noise = logs.MOTION_NOISE
+    logs.write_motion(folder / "motion.csv", *log(span=4.0, **noise))
     other = log(span=4.0, seed=1, turn=0.7, move=-0.8, **noise)
-    test_identify.write(folder / "motion_2.csv", *other)
+    logs.write_motion(folder / "motion_2.csv", *other)
     swings.write(folder / "swings.csv")
     swings.believed_file(folder)
     test_replay.written(folder, test_replay.OFFSETS).replace(folder / "replay.csv")
     for kind in ("charuco", "chessboard"):
         board = make_board(kind)
         for k, place in enumerate(board_poses(board, 8, 0.45, spread=0.35)):
-            picture = board_image(
-                board, test_calibrate_camera.K, test_calibrate_camera.LENS, (640, 480), place
-            )
+            picture = board_image(board, test_fits.K, test_fits.LENS, (640, 480), place)
             cv2.imwrite(str(folder / f"{kind}_{k}.png"), picture)
     cv2.imwrite(str(folder / "empty.png"), np.full((480, 640), 128, np.uint8))

@@ -15,8 +15,8 @@ from cdpr_drake.models.robot_loader import load_robot
 STANDS, STOPS, NOISE = 30, 5, 1e-4
 
 
-@pytest.fixture
-def log():
+@pytest.fixture(scope="module")
+def stopping():
     """Lengths, swivel angles that pass pi, and tensions of stops and ways between, at 10 Hz."""
     random = np.random.default_rng(0)
     corners = random.uniform(-0.2, 0.2, (STOPS + 1, 4))
@@ -34,13 +34,12 @@ def log():
 
 
 def task(log, rest=None):
-    return CalibrationTask(
-        robot=load_robot("irma4u"), log=log, unknown=("length_offsets",), rest=rest
-    )
+    unknown = ("length_offsets",)
+    return CalibrationTask(robot=load_robot("irma4u"), log=log, unknown=unknown, rest=rest)
 
 
-def test_each_stop_is_a_row_with_its_means(log):
-    log, corners = log
+def test_each_stop_is_a_row_with_its_means(stopping):
+    log, corners = stopping
     stops = at_rest(task(log))
     means = stops.log
     assert stops.rest is None
@@ -54,12 +53,13 @@ def test_each_stop_is_a_row_with_its_means(log):
     assert "rows in which a length or an angle changes" in words
 
 
-def test_a_log_that_balance_does_not_need_stays_as_it_is(log):
-    for asked in (task(log[0], rest=False), task(replace(log[0], time=None))):
-        assert at_rest(asked) is asked
+def test_a_log_that_balance_does_not_need_stays_as_it_is(stopping):
+    log, _ = stopping
+    for unchanged in (task(log, rest=False), task(replace(log, time=None))):
+        assert at_rest(unchanged) is unchanged
 
 
-def test_without_a_stop_balance_is_left_out_unless_it_is_asked_for():
+def test_without_a_stop_balance_is_left_out_unless_it_is_required():
     time = 0.1 * np.arange(200)
     rows = 0.2 * np.sin(0.8 * time[:, None] + np.arange(4))
     drive = Measurements(

@@ -1,6 +1,6 @@
 """Logs with systematic errors, and clean ones: what a calibration says of each.
 
-`python -m tests.analyses.calibration.attack` prints a table of attacks. `--clean 200` calibrates so
+`python -m tests.analyses.fits.attack` prints a table of attacks. `--clean 200` calibrates so
 many clean logs and counts false alarms. `--robot ROBOT --log LOG` attacks another log, whose clean
 fit is the truth then. `--seed` draws other poses, noise and rows. An attack is met where the
 verdict is a misfit, or a refusal, with its reason, or where poses stay within their stated
@@ -9,9 +9,9 @@ deviations, see `WITHIN`.
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +22,13 @@ from cdpr_drake.analyses.fits.robots import calibration_model
 from cdpr_drake.analyses.fits.setup import Sigmas
 from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.calibration.measurements import simulated_poses
-from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.statics.equilibrium import equilibrium_near
+from tests.analyses.fits.logs import ROBOT, inclinations, numbers, random_poses
 
 WITHIN = 3.0
 """Poses are right where their errors, the larger of turn and place, are at most so many of their
@@ -61,22 +61,6 @@ class Scene:
     options: dict
 
 
-def _some_cables(count: int) -> Robot:
-    robot = load_robot("acrobot_small")
-    return replace(robot, cables=robot.cables[:count])
-
-
-def _free_poses(count: int, random: np.random.Generator) -> list[RigidTransform]:
-    """Poses in the middle of ACROBOT's frame, in random order."""
-    return [
-        pose_from_angles(
-            np.append(random.uniform(-0.2, 0.2, 2), random.uniform(0.2, 0.6)),
-            random.uniform(-0.3, 0.3, 3),
-        )
-        for _ in range(count)
-    ]
-
-
 @cache
 def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
     """Poses at which the weight holds IRMA4U, and tensions there."""
@@ -87,7 +71,7 @@ def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
     while len(poses) < count:
         place = np.append(random.uniform(-0.4, 0.4, 2), random.uniform(0.4, 1.2))
         X_WP = pose_from_angles(place, random.uniform(-0.2, 0.2, 3))
-        lengths = Point(model, Stations.at([X_WP])).numbers[0, :, 0]
+        lengths = numbers(model, [X_WP])[0, :, 0]
         rest = equilibrium_near(cables, "elastic", platform, lengths, X_WP)
         if np.min(rest.tensions) > 3.0 and np.max(rest.tensions) < 300.0:
             poses.append(rest.X_WP)
@@ -95,154 +79,119 @@ def _resting(count: int, seed: int) -> tuple[list[RigidTransform], np.ndarray]:
     return poses, np.array(tensions)
 
 
-def scene(
-    name: str, count: int = 27, seed: int = 0, noise: Sigmas = NOISE, **options: object
-) -> Scene:
+def scene(name: str, count: int = 27, seed: int = 0, **options: object) -> Scene:
     """A simulated log: "tracked" or "blind", and the number of cables."""
     kind, cables = name[:-1], int(name[-1])
     random = np.random.default_rng([seed, cables, len(kind)])
-    tensions = None
     if cables == 4:
-        robot = load_robot("irma4u")
-        poses, tensions = _resting(count, seed)
+        robot, (poses, tensions) = load_robot("irma4u"), _resting(count, seed)
     else:
-        robot, poses = _some_cables(cables), _free_poses(count, random)
-    numbers = Point(calibration_model(robot), Stations.at(poses)).numbers
+        tensions = None
+        robot, poses = replace(ROBOT, cables=ROBOT.cables[:cables]), random_poses(random, count)
+    true = numbers(calibration_model(robot), poses)
     strain = 0.0 if tensions is None else tensions / robot.stiffness()
 
     def noisy(values: np.ndarray, sigma: float) -> np.ndarray:
         return values + sigma * random.standard_normal(values.shape)
 
-    lengths = noisy(numbers[:, :, 0] / (1.0 + strain), noise.lengths)
+    lengths = noisy(true[:, :, 0] / (1.0 + strain), NOISE.lengths)
     log = Measurements(Path(name), count, lengths=lengths)
     if tensions is not None:
-        log = replace(log, tensions=noisy(tensions, noise.tensions))
+        log = replace(log, tensions=noisy(tensions, NOISE.tensions))
     if kind == "tracked":
-        seen = simulated_poses(poses, noise.turn, noise.place, random)
+        seen = simulated_poses(poses, NOISE.turn, NOISE.place, random)
         asked = {"unknown": ("exit_points", "length_offsets"), "priors": {"exit_points": 0.01}}
         return Scene(robot, replace(log, poses=list(seen)), poses, {**asked, **options})
-    tilts = np.array([RollPitchYaw(X.rotation()).vector() for X in poses])
-    tilts = tilts + random.standard_normal(tilts.shape) * [noise.tilt, noise.tilt, noise.yaw]
-    log = replace(log, swivels=noisy(numbers[:, :, 2], noise.swivels), tilts=tilts)
+    sigmas = [NOISE.tilt, NOISE.tilt, NOISE.yaw]
+    tilts = inclinations(poses) + random.standard_normal((count, 3)) * sigmas
+    log = replace(log, swivels=noisy(true[:, :, 2], NOISE.swivels), tilts=tilts)
     asked = {} if cables == 4 else {"unknown": ("length_offsets",), "rest": False}
     return Scene(robot, log, poses, {"start": poses[0], **asked, **options})
 
 
-Attack = tuple[str, Callable[[Measurements], Measurements]]
+def _with(log: Measurements, field: str, where: object, values: object) -> Measurements:
+    """A copy with other readings at these places."""
+    readings = getattr(log, field).copy()
+    readings[where] = values
+    return replace(log, **{field: readings})
 
 
-def _spoilt(field: str, change: Callable[[np.ndarray], None]) -> Callable:
-    """What changes a copy of the readings."""
+def _scaled(log: Measurements, field: str, where: object, factor: float) -> Measurements:
+    return _with(log, field, where, factor * getattr(log, field)[where])
 
-    def spoil(log: Measurements) -> Measurements:
+
+def _turned_angles(log: Measurements, axis: int, rows: np.ndarray) -> Measurements:
+    """Roll, pitch or yaw of a tracker with the other sign, in some rows."""
+    poses = list(log.poses)
+    for row in rows:
+        angles = RollPitchYaw(poses[row].rotation()).vector()
+        angles[axis] *= -1.0
+        poses[row] = RigidTransform(RollPitchYaw(angles), poses[row].translation())
+    return replace(log, poses=poses)
+
+
+def attacks(log: Measurements, seed: int = 1) -> Iterator[tuple[str, Measurements]]:
+    """Logs with errors that its measurements may have, each with the name of its error."""
+    field = "lengths" if log.lengths is not None else "angles"
+    readings = getattr(log, field)
+    count, cables = readings.shape
+
+    def rows(share: float, order: np.ndarray) -> np.ndarray:
+        return order[: max(1, round(share * count))]
+
+    def swapped(field: str, k: int, n: int, rows: object = slice(None)) -> Measurements:
         values = getattr(log, field).copy()
-        change(values)
+        values[rows, k], values[rows, n] = getattr(log, field)[rows, n], values[rows, k].copy()
         return replace(log, **{field: values})
 
-    return spoil
+    def late(rows: int, cables: object) -> Measurements:
+        return _with(log, field, np.s_[rows:, cables], readings[:-rows, cables])
 
+    def added(course: np.ndarray) -> Measurements:
+        mean = np.nanmean(np.abs(readings[:, 1]))
+        return _with(log, field, np.s_[:, 1], readings[:, 1] + mean * course)
 
-def _scaled(field: str, which: Callable[[np.ndarray], object], factor: float) -> Callable:
-    def change(values: np.ndarray) -> None:
-        values[which(values)] *= factor
-
-    return _spoilt(field, change)
-
-
-def _rows(count: int, share: float, seed: int | None) -> np.ndarray:
-    """A share of rows: the first ones, or with a seed any."""
-    order = np.arange(count) if seed is None else np.random.default_rng(seed).permutation(count)
-    return order[: max(1, round(share * count))]
-
-
-def _swapped(field: str, k: int = 0, n: int = 1, share: float = 1.0, seed: int = 1) -> Callable:
-    def change(values: np.ndarray) -> None:
-        rows = _rows(len(values), share, seed)[:, None]
-        values[rows, [k, n]] = values[rows, [n, k]]
-
-    return _spoilt(field, change)
-
-
-def _late(field: str, rows: int, cables: object) -> Callable[[Measurements], Measurements]:
-    def change(values: np.ndarray) -> None:
-        values[rows:, cables] = values[:-rows, cables].copy()
-
-    return _spoilt(field, change)
-
-
-def _added(field: str, cable: int, course: Callable[[np.ndarray], np.ndarray]) -> Callable:
-    """A cable's readings off by a share of their mean, which varies over the log, 0 to 1."""
-
-    def change(values: np.ndarray) -> None:
-        mean = np.nanmean(np.abs(values[:, cable]))
-        values[:, cable] += mean * course(np.linspace(0.0, 1.0, len(values)))
-
-    return _spoilt(field, change)
-
-
-def _turned_angles(axis: int, share: float, seed: int) -> Callable:
-    """Roll, pitch or yaw of a tracker with the other sign, in some rows."""
-
-    def spoil(log: Measurements) -> Measurements:
-        poses = list(log.poses)
-        for row in _rows(len(poses), share, seed):
-            angles = RollPitchYaw(poses[row].rotation()).vector()
-            angles[axis] *= -1.0
-            poses[row] = RigidTransform(RollPitchYaw(angles), poses[row].translation())
-        return replace(log, poses=poses)
-
-    return spoil
-
-
-def attacks(log: Measurements, seed: int = 1) -> Iterator[Attack]:
-    """Errors that its measurements may have."""
-    field = "lengths" if log.lengths is not None else "angles"
-    cables = getattr(log, field).shape[1]
+    mixed = np.random.default_rng(seed).permutation(count)
     for axis, name in enumerate(("roll", "pitch", "yaw")):
-        for share in (1.0, 0.4):
-            some = "" if share == 1.0 else f" in {100 * share:.0f} % of rows"
+        for share, some in ((1.0, ""), (0.4, " in 40 % of rows")):
+            hit = rows(share, mixed)
             if log.tilts is not None:
-                rows = partial(lambda v, share, axis: (_rows(len(v), share, seed), axis),
-                               share=share, axis=axis)  # fmt: skip
-                yield f"-{name}{some}", _scaled("tilts", rows, -1.0)
+                yield f"-{name}{some}", _scaled(log, "tilts", (hit, axis), -1.0)
             if log.poses is not None:
-                yield f"-{name} of tracker{some}", _turned_angles(axis, share, seed)
+                yield f"-{name} of tracker{some}", _turned_angles(log, axis, hit)
     if log.swivels is not None:
-        yield "-swivel of cable 1", _scaled("swivels", lambda v: np.s_[:, 0], -1.0)
-        yield "swivels of cables 1, 2 swapped", _swapped("swivels")
-        yield "swivel of cable 2 in degrees", _scaled("swivels", lambda v: np.s_[:, 1], 57.3)
+        yield "-swivel of cable 1", _scaled(log, "swivels", np.s_[:, 0], -1.0)
+        yield "swivels of cables 1, 2 swapped", swapped("swivels", 0, 1)
+        yield "swivel of cable 2 in degrees", _scaled(log, "swivels", np.s_[:, 1], 57.3)
     if log.tensions is not None:
-        yield "-tension of cable 1", _scaled("tensions", lambda v: np.s_[:, 0], -1.0)
-        yield "tensions in kgf", _scaled("tensions", lambda v: np.s_[:, :], 1.0 / 9.81)
+        yield "-tension of cable 1", _scaled(log, "tensions", np.s_[:, 0], -1.0)
+        yield "tensions in kgf", _scaled(log, "tensions", np.s_[:, :], 1.0 / 9.81)
     for share in SHARES:
-        for mixed in (False, True):
+        for which, order in (("the first", np.arange(count)), ("mixed", mixed)):
             for factor in FACTORS if share in (0.3, 0.5) else FACTORS[:1]:
-                name = f"{100 * share:.0f} % of rows, {'mixed' if mixed else 'the first'}"
-                rows = partial(lambda v, share, start: _rows(len(v), share, start),
-                               share=share, start=seed if mixed else None)  # fmt: skip
-                yield f"{name}, x {factor:g}", _scaled(field, rows, factor)
+                name = f"{100 * share:.0f} % of rows, {which}, x {factor:g}"
+                yield name, _scaled(log, field, rows(share, order), factor)
+    half = np.random.default_rng(seed + 1).uniform(size=readings.shape) < 0.5
     for factor in FACTORS:
-        half = partial(
-            lambda v, s: np.random.default_rng(s).uniform(size=v.shape) < 0.5, s=seed + 1
-        )
-        yield f"half of all lengths x {factor:g}", _scaled(field, half, factor)
-        yield f"cable 1 x {factor:g}", _scaled(field, lambda v: np.s_[:, 0], factor)
-        yield f"cable 3 x {factor:g}", _scaled(field, lambda v: np.s_[:, 2], factor)
-        yield f"cables 2, 3 x {factor:g}", _scaled(field, lambda v: np.s_[:, 1:3], factor)
-        yield f"all cables x {factor:g}", _scaled(field, lambda v: np.s_[:, :], factor)
-    yield "cable 2 in inches", _scaled(field, lambda v: np.s_[:, 1], 1.0 / 0.0254)
-    yield "cables 1, 2 swapped", _swapped(field)
-    yield f"cables 1, {cables} swapped", _swapped(field, 0, cables - 1)
-    yield "cables 2, 3 swapped in 40 % of rows", _swapped(field, 1, 2, 0.4, seed)
-    for rows in (1, 3):
-        yield f"cable 1 late by {rows}", _late(field, rows, 0)
-    for rows in (1, 2):
-        yield f"all cables late by {rows}", _late(field, rows, np.s_[:])
-    yield "cable 2 drifts by 5 %", _added(field, 1, lambda s: 0.05 * s)
-    yield (
-        "cable 2 slips by 5 % for a while",
-        _added(field, 1, lambda s: 0.05 * (abs(s - 0.5) < 0.2)),
-    )
+        for name, where in (
+            ("half of all lengths", half),
+            ("cable 1", np.s_[:, 0]),
+            ("cable 3", np.s_[:, 2]),
+            ("cables 2, 3", np.s_[:, 1:3]),
+            ("all cables", np.s_[:, :]),
+        ):
+            yield f"{name} x {factor:g}", _scaled(log, field, where, factor)
+    yield "cable 2 in inches", _scaled(log, field, np.s_[:, 1], 1.0 / 0.0254)
+    yield "cables 1, 2 swapped", swapped(field, 0, 1)
+    yield f"cables 1, {cables} swapped", swapped(field, 0, cables - 1)
+    yield "cables 2, 3 swapped in 40 % of rows", swapped(field, 1, 2, rows(0.4, mixed))
+    yield "cable 1 late by 1", late(1, 0)
+    yield "cable 1 late by 3", late(3, 0)
+    yield "all cables late by 1", late(1, np.s_[:])
+    yield "all cables late by 2", late(2, np.s_[:])
+    s = np.linspace(0.0, 1.0, count)
+    yield "cable 2 drifts by 5 %", added(0.05 * s)
+    yield "cable 2 slips by 5 % for a while", added(0.05 * (abs(s - 0.5) < 0.2))
 
 
 @dataclass(frozen=True)
@@ -269,17 +218,17 @@ class Outcome:
         return self.status != "converged" or self.off <= WITHIN
 
 
-def outcome(of: Scene, spoil: Callable[[Measurements], Measurements] | None = None) -> Outcome:
+def outcome(of: Scene, log: Measurements | None = None) -> Outcome:
     """Calibrates from a log, spoilt or clean."""
-    log, began = of.log if spoil is None else spoil(of.log), time.process_time()
+    began = time.process_time()
     try:
-        found = cdpr.calibrate(of.robot, log, **of.options)
+        fit = cdpr.calibrate(of.robot, of.log if log is None else log, **of.options)
     except CdprError as problem:
         return Outcome("refused", np.nan, np.nan, time.process_time() - began, str(problem))
-    took, result = time.process_time() - began, found.result
+    took, result = time.process_time() - began, fit.result
     errors = [pose_error(X, Y) for X, Y in zip(of.poses, result.stations.poses(), strict=True)]
     off = np.array(errors)[:, ::-1] / np.where(result.pose_std > 0.0, result.pose_std, np.inf)
-    words = found.misfit or tuple(w for w in found.remarks if "not used" not in w)
+    words = fit.misfit or tuple(w for w in fit.remarks if "not used" not in w)
     return Outcome(
         result.status, float(np.sqrt(np.mean(np.max(off, axis=1) ** 2))),
         1e3 * max(distance for distance, _ in errors), took, "; ".join(words[:2]),
@@ -361,8 +310,8 @@ def main() -> None:
         if asked.only and asked.only not in name:
             continue
         one = made()
-        for words, spoil in [("clean", None), *attacks(one.log, 1 + asked.seed)]:
-            said = outcome(one, spoil)
+        for words, log in [("clean", None), *attacks(one.log, 1 + asked.seed)]:
+            said = outcome(one, log)
             missed += not said.is_met
             print(
                 f"{name:13} {words:36} {said.status:10} {said.off:6.1f} {said.millimetres:7.1f} mm "

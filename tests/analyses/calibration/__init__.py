@@ -1,1 +1,0 @@
-"""Tests of `cdpr_drake.analyses.calibration`."""
