@@ -91,7 +91,7 @@ def test_measurements_that_have_no_square_are_a_line(command, here, capsys):
     text = "\n".join(",".join(row) for row in [["time_s", *names], *rows])
     (here / "log.csv").write_text(text + "\n")
     said = refuse(capsys, command, "acrobot_small", "log.csv")
-    assert said.startswith("cdpr: log.csv:2: C8_length_m: found 1e300; accepted: a number up to")
+    assert said.startswith("cdpr: log.csv:2: C8_length_m: found '1e300'; accepted: a number up to")
 
 
 NASTY = "\x1b[31mred\x9b2J\u202e\x07"

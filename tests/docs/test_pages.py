@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import cdpr_drake as cdpr
+from cdpr_drake.analyses.logs.dialects import DIALECTS
 from cdpr_drake.cli.app import main
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.tensions.methods import METHODS
@@ -45,7 +46,7 @@ def with_blocks(language):
 @pytest.fixture(autouse=True)
 def tables_as_before():
     """Pages may add to tables of kinds; other tests do not see it."""
-    kept = [(table, dict(table)) for table in (ESTIMATORS, METHODS)]
+    kept = [(table, dict(table)) for table in (DIALECTS, ESTIMATORS, METHODS)]
     yield
     for table, before in kept:
         table.clear()

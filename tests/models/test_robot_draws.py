@@ -123,7 +123,7 @@ def test_files_of_fits_and_results(tmp_path):
     file.write_text("{}")
     with pytest.raises(DataFileError, match="found no parameters with a covariance"):
         ParameterCovariance.of(tmp_path)
-    with pytest.raises(DataFileError, match=r"results\.json or identification\.json"):
+    with pytest.raises(DataFileError, match=r"accepted: results\.json of cdpr calibrate"):
         ParameterCovariance.of(tmp_path / "nowhere")
 
 

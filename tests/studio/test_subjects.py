@@ -113,18 +113,18 @@ async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, b
             lambda: bench.scene().meshcat.HasPath("workspaces/all")
         ).result(60.0)
 
-    assert in_scene()
+    await until(in_scene)
     bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
-    assert not in_scene()
+    await until(lambda: not in_scene())
     field(user, "layer-static").value = True  # what is switched on meanwhile is not there
-    assert not in_scene()
+    await until(lambda: not in_scene())
     assert "not in the scene" in field(user, "regions-note").text
     bench.robot.undo()
-    assert in_scene()
+    await until(in_scene)
     bench.draws(Subject("another", "x"))  # a run of another robot
-    assert not in_scene()
+    await until(lambda: not in_scene())
     bench.draws(None)
-    assert in_scene()
+    await until(in_scene)
     (work / "workspaces" / ".small.about.json").unlink()
     _views[bench].take(None)
     await workspaces(user, bench)

@@ -34,6 +34,7 @@ ASKED = {
     "plan_free_motion": lambda robot: cdpr.plan_free_motion(robot, None, None),
     "plan_proven_motion": lambda robot: cdpr.plan_proven_motion(robot, None, None),
     "reconfigure": lambda robot: cdpr.reconfigure(robot, poses=[None]),
+    "import_log": lambda robot: cdpr.import_log("log.csv", robot=robot),
     "replay_log": lambda robot: cdpr.replay_log("log.csv", robot=robot),
     "calibrate": lambda robot: cdpr.calibrate(robot, "log.csv"),
     "identify": lambda robot: cdpr.identify(robot, "log.csv"),
