@@ -9,6 +9,7 @@ through those.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -137,22 +138,10 @@ def join_logs(first: Log, second: Log) -> Log:
     by = _moving(first, True), _moving(second, False)
     clock = align_clocks(first.time, first.table(by[0]), second.time, second.table(by[1]))
     names = [name for name in second.frame if name != SECONDS]
-    whole = set(PARTS[QUATERNION]) <= set(names)
-    table = second.table(names).copy()
-    if whole:  # they go on without a change of sign
-        columns = np.array([names.index(name) for name in PARTS[QUATERNION]])
-        rows = np.flatnonzero(np.isfinite(table[:, columns]).all(axis=1))
-        q = table[np.ix_(rows, columns)]
-        turned = np.sum(q[1:] * q[:-1], axis=1) < 0.0
-        sign = np.cumprod(np.where(np.concatenate([[False], turned]), -1.0, 1.0))
-        table[np.ix_(rows, columns)] = q * sign[:, None]
-    table = interpolate_rows(second.time, table, clock.on_other_clock(first.time))
+    table = interpolate_poses(
+        second.time, second.table(names), names, clock.on_other_clock(first.time)
+    )
     frame = first.frame.assign(**dict(zip(names, table.T, strict=True)))
-    if whole:
-        q = frame[list(PARTS[QUATERNION])].to_numpy().T
-        size = np.linalg.norm(q, axis=0)
-        size = np.where(q[0] < 0.0, -size, size)
-        frame = frame.assign(**dict(zip(PARTS[QUATERNION], q / size, strict=True)))
     shift, drift = clock.sigmas
     words = (
         f"the second clock is read {clock.shift:+.5f} s later, sigma {1e3 * shift:.3f} ms, at "
@@ -178,6 +167,24 @@ def join_logs(first: Log, second: Log) -> Log:
     )  # fmt: skip
     remarks = [*(f"{name}: {remark}" for remark in second.remarks), words]
     return joined.with_remarks(*remarks, *([lonely] if missing else []))
+
+
+def interpolate_poses(time: Array, table: Array, names: Sequence[str], at: Array) -> Array:
+    """Columns at other instants, as `interpolate_rows`, where quaternions stay rotations."""
+    columns = [names.index(name) for name in PARTS[QUATERNION] if name in names]
+    if len(columns) == len(PARTS[QUATERNION]):  # they go on without a change of sign
+        rows = np.flatnonzero(np.isfinite(table[:, columns]).all(axis=1))
+        q = table[np.ix_(rows, columns)]
+        turned = np.sum(q[1:] * q[:-1], axis=1) < 0.0
+        sign = np.cumprod(np.where(np.concatenate([[False], turned]), -1.0, 1.0))
+        table = table.copy()
+        table[np.ix_(rows, columns)] = q * sign[: len(q), None]
+    table = interpolate_rows(time, table, at)
+    if len(columns) == len(PARTS[QUATERNION]):
+        q = table[:, columns]
+        size = np.linalg.norm(q, axis=1, keepdims=True)
+        table[:, columns] = q / np.where(q[:, :1] < 0.0, -size, size)
+    return table
 
 
 def _moving(log: Log, cables_first: bool) -> list[str]:

@@ -195,7 +195,7 @@ def _idle(log: Log, facts: Facts) -> list[str]:
         idle.append(f"a rate of {facts.rate:g} 1/s, since the file has times")
     if facts.body is not None and log.dialect != "motive":
         idle.append(f"the rigid body {facts.body}, since only motive files have some")
-    if facts.topics is not None and log.dialect != "rosbag":
+    if facts.topics is not None and log.dialect not in ("rosbag", "mcap"):
         idle.append(f"the topics {', '.join(facts.topics)[:80]}, since only bags have some")
     stems = [name.removeprefix(COMMANDED).removeprefix(ESTIMATED) for name in log.frame]
     if facts.cables and not any(s.startswith(f"{c}_") for c in facts.cables for s in stems):

@@ -9,7 +9,7 @@ Source: docs.ros.org, sensor_msgs, geometry_msgs, std_msgs; ternaris.gitlab.io/r
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.assembly import WORDS, Cells, assemble
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, WORDS, Cells, assemble
+from cdpr_drake.analyses.logs.clocks import interpolate_poses
 from cdpr_drake.analyses.logs.columns import (
     CABLE_QUANTITIES,
     MOST_CABLES,
@@ -30,7 +31,6 @@ from cdpr_drake.analyses.logs.columns import (
 from cdpr_drake.analyses.logs.log import Facts, Log, refusal, unreadable
 from cdpr_drake.analyses.reporting.mcap_log import TIME_KEY
 from cdpr_drake.errors import LogFileError, install_words
-from cdpr_drake.numerics.clock_alignment import interpolate_rows
 from cdpr_drake.schema.json_text import load_json
 
 ROS1, SQLITE = b"#ROSBAG V2.0", b"SQLite format 3\0"
@@ -51,6 +51,9 @@ position0, position1, ..."""
 MOST_NUMBERS = 64
 """Longer arrays, as of images and point clouds, are left out."""
 
+TRANSFORM = "foxglove.FrameTransform"
+"""Schema of poses in MCAP with JSON."""
+
 
 def renamed(cell: str, patterns: Headers) -> str:
     """The header with a unit for which one of a file stands."""
@@ -63,32 +66,51 @@ def renamed(cell: str, patterns: Headers) -> str:
 
 @dataclass
 class _Topic:
-    """Messages of a topic: times of their headers, 0 without, and of the recorder [ns], numbers."""
+    """Messages of a topic: numbers by field, and times of their headers, 0 without, and of the
+    recorder, in ns, or in s of JSON."""
 
-    stamps: list[int] = field(default_factory=list)
-    times: list[int] = field(default_factory=list)
+    stamps: list[float] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
     rows: list[dict[str, float]] = field(default_factory=list)
     joints: list[str] = field(default_factory=list)
     left_out: dict[str, str] = field(default_factory=dict)
 
     def clock(self) -> np.ndarray:
-        """Times of the headers if these grow, else those of the recorder [ns]."""
-        stamps = np.array(self.stamps, np.int64)
-        return stamps if np.all(np.diff(stamps) > 0) else np.array(self.times, np.int64)
+        """Times of the headers if these grow, else those of the recorder."""
+        stamps = np.array(self.stamps)
+        return stamps if np.all(np.diff(stamps) > 0) else np.array(self.times)
+
+    def keys(self) -> list[str]:
+        """Fields, in the order of the longest message: what is not finite is in none of JSON."""
+        longest = max(self.rows, key=len)
+        return list(dict.fromkeys([*longest, *(key for row in self.rows for key in row)]))
+
+
+def _need(path: Path, package: str, extra: str) -> None:
+    if find_spec(package) is None:
+        words = f"needs {package}, which is not installed; {install_words(extra)}"
+        raise LogFileError(f"{path}: {words}")
 
 
 def read_bag(path: Path, _: str, facts: Facts) -> Log:
     """Reads numbers of all topics, or of some, at the times of the one that measures cables."""
-    if find_spec("rosbags") is None:
-        raise LogFileError(f"{path}: needs rosbags, which is not installed; {install_words('ros')}")
-    topics = _topics(path)
+    _need(path, "rosbags", "ros")
+    return _joined(path, "rosbag", "it is a bag of ROS", _bag_topics(path), facts)
+
+
+def _joined(
+    path: Path, dialect: str, why: str, topics: dict[str, _Topic], facts: Facts,
+    other: Mapping[str, str] | None = None,
+) -> Log:  # fmt: skip
+    """One log of topics; fields of JSON are headers themselves, others have that of their topic."""
     missing = [name for name in facts.topics or () if name not in topics]
     chosen = {n: t for n, t in topics.items() if t.rows and n in (facts.topics or topics)}
     if missing or not any(row for topic in chosen.values() for row in topic.rows):
         accepted = f"some of {', '.join(topics)[:200] or 'a bag with messages'}"
         raise refusal(f"{path}: topic", (missing or ["no numbers"])[0], accepted)
+    bag = dialect == "rosbag"
     headers = {
-        name: {key: renamed(_header(name, key), ROS_COLUMNS) for row in topic.rows for key in row}
+        name: {key: renamed(_header(name, key), ROS_COLUMNS) if bag else key for key in topic.keys()}
         for name, topic in chosen.items()
     }
 
@@ -99,33 +121,31 @@ def read_bag(path: Path, _: str, facts: Facts) -> Log:
         return cables, len(chosen[name].rows)
 
     first = max(chosen, key=weight)
-    start = int(chosen[first].clock()[0])
-    at = 1e-9 * (chosen[first].clock() - start)
+    start, scale = (int(chosen[first].clock()[0]), 1e-9) if bag else (0, 1.0)
+    at = scale * (chosen[first].clock() - start)
     columns: list[tuple[str, Cells]] = [(SECONDS, at)]
-    shown, left_out = [first], dict[str, str]()
-    remarks = [f"times count from the first message of {first}, {start} ns"]
+    shown, left_out = [first if bag else SECONDS], dict(other or {})
+    remarks = [f"times count from the first message of {first}, {start} ns"] if bag else []
     for name, topic in chosen.items():
         keys = [key for key, header in headers[name].items() if header]
         table = np.array([[row.get(key, np.nan) for key in keys] for row in topic.rows])
-        if name != first:
-            time = 1e-9 * (topic.clock() - start)
-            lonely = np.full((len(at), table.shape[1]), np.nan)
-            table = interpolate_rows(time, table, at) if len(time) > 1 else lonely
+        time = scale * (topic.clock() - start)
+        if not np.array_equal(time, at):
+            table = interpolate_poses(time, table, [headers[name][key] for key in keys], at)
             remarks.append(f"{name} is read between its messages, at the times of {first}")
         columns += [(headers[name][key], column) for key, column in zip(keys, table.T, strict=True)]
-        shown += [f"{name}/{key}" for key in keys]
+        shown += [f"{name}/{key}" if bag else key for key in keys]
         left_out |= {f"{name}/{key}": fate for key, fate in topic.left_out.items()}
-        left_out |= {f"{name}/{key}": "left out" for key, h in headers[name].items() if not h}
+        left_out |= {f"{name}/{key}": LEFT_OUT for key, h in headers[name].items() if not h}
         joints = ", ".join(f"{k} is {joint}" for k, joint in enumerate(topic.joints))
         remarks += [f"joints of {name}: {joints}"] if joints else []
     left_out |= {name: "another topic" for name in topics if name not in chosen}
     return assemble(
-        path, "rosbag", "it is a bag of ROS", columns, facts, shown=shown, remarks=remarks,
-        left_out=left_out,
-    )  # fmt: skip
+        path, dialect, why, columns, facts, shown=shown, remarks=remarks, left_out=left_out
+    )
 
 
-def _topics(path: Path) -> dict[str, _Topic]:
+def _bag_topics(path: Path) -> dict[str, _Topic]:
     """Messages by topic."""
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
@@ -141,13 +161,9 @@ def _topics(path: Path) -> dict[str, _Topic]:
                 topic.times.append(time)
                 if "JointState" in connection.msgtype:
                     topic.joints = list(message.name)
-                row: dict[str, float] = {}
-                for key, value in _fields(message, ""):
-                    if isinstance(value, str):
-                        topic.left_out[key] = value
-                    else:
-                        row[key] = value
-                topic.rows.append(row)
+                values = dict(_fields(message, ""))
+                topic.rows.append({k: v for k, v in values.items() if not isinstance(v, str)})
+                topic.left_out |= {k: v for k, v in values.items() if isinstance(v, str)}
     except Exception as problem:  # the library raises of many kinds on damaged files
         raise unreadable(path, "a bag of ROS", problem) from problem
     return topics
@@ -165,10 +181,8 @@ def _fields(value: Any, key: str) -> Iterator[tuple[str, float | str]]:
             return
         for k, each in enumerate(value):
             yield from _fields(each, f"{key}[{k}]")
-    elif isinstance(value, str | bytes):
-        yield key, WORDS
     else:
-        yield key, float(value)
+        yield key, WORDS if isinstance(value, str | bytes) else float(value)
 
 
 def _header(topic: str, key: str) -> str:
@@ -178,82 +192,51 @@ def _header(topic: str, key: str) -> str:
     return key
 
 
-TRANSFORM = "foxglove.FrameTransform"
-"""Schema of poses."""
-
-Rows = dict[float, dict[str, Any]]
-
-
 def read_mcap(path: Path, _: str, facts: Facts) -> Log:
-    """Reads channels of flat objects of numbers in JSON, whose keys are headers, all of the same
-    times: those of the key `time_s`, or of the messages. A file with transforms alone tells the
-    platform's pose.
+    """Reads channels of flat objects of numbers in JSON, whose keys are headers, at the key
+    `time_s` or the times of messages; of transforms, if there are no others, the platform's pose.
 
     Source: mcap.dev/spec.
     """
-    if find_spec("mcap") is None:
-        raise LogFileError(f"{path}: needs mcap, which is not installed; {install_words('mcap')}")
-    channels, poses, other, encodings = _messages(path)
-    chosen = channels or poses
-    if not chosen and encodings & {"cdr", "ros1"}:
-        return read_bag(path, "", facts)
-    if not chosen:
-        found = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
-        raise refusal(path, found, "messages in JSON")
-    (first, rows), *rest = chosen.items()
-    times = list(rows)
-    for topic, others in rest:
-        if list(others) != times:
-            words = f"{len(others)} messages at other times than the {len(times)} of {first}"
-            raise refusal(f"{path}: {topic}", words, "the same times")
-    columns: list[tuple[str, Cells]] = [(SECONDS, np.array(times))]
-    for each in chosen.values():
-        for name in _keys(each):
-            columns.append((name, np.array([each[t].get(name, np.nan) for t in times])))
-    log = assemble(
-        path, "mcap", "it begins with the magic bytes of MCAP", columns, facts,
-        left_out=dict.fromkeys(sorted(other), "no numbers in JSON"),
-    )  # fmt: skip
-    words = f"Left out, no numbers in JSON: {', '.join(sorted(other))}."
-    return log.with_remarks(words) if other else log
-
-
-def _keys(rows: Rows) -> list[str]:
-    """All keys of a channel, in the order of the first message that has them all, else as they
-    come: what is not finite, or not known, is in no message."""
-    known = dict.fromkeys(name for row in rows.values() for name in row)
-    return list(next((row for row in rows.values() if len(row) == len(known)), known))
-
-
-def _messages(path: Path) -> tuple[dict[str, Rows], dict[str, Rows], set[str], set[str]]:
-    """Rows by time of channels of numbers, those of transforms, other channels, and encodings."""
+    _need(path, "mcap", "mcap")
     from mcap.reader import make_reader
 
-    channels: dict[str, Rows] = {}
-    poses: dict[str, Rows] = {}
-    other, encodings = set[str](), set[str]()
+    topics: dict[str, _Topic] = {}
+    transforms, other, encodings = set[str](), dict[str, str](), set[str]()
     try:
         with path.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
                 encodings.add(channel.message_encoding)
-                if channel.message_encoding != "json":
-                    other.add(channel.topic)
-                    continue
-                content = load_json(message.data)
-                time = 1e-9 * message.log_time
-                if schema is not None and schema.name == TRANSFORM:
-                    name = f"{channel.topic} of {content['child_frame_id']}"
-                    poses.setdefault(name, {})[time] = _pose(content)
-                elif isinstance(content, dict) and all(
-                    value is None or type(value) in (int, float) for value in content.values()
+                json = channel.message_encoding == "json"
+                content, name = load_json(message.data) if json else None, channel.topic
+                if json and schema is not None and schema.name == TRANSFORM:
+                    name = f"{name} of {content['child_frame_id']}"
+                    transforms.add(name)
+                    content = _pose(content)
+                if not isinstance(content, dict) or any(
+                    value is not None and type(value) not in (int, float)
+                    for value in content.values()
                 ):
-                    row = {name: float(v) for name, v in content.items() if v is not None}
-                    channels.setdefault(channel.topic, {})[row.pop(TIME_KEY, time)] = row
-                else:
-                    other.add(channel.topic)
+                    other[name] = "no numbers in JSON"
+                    continue
+                row = {key: float(value) for key, value in content.items() if value is not None}
+                topic = topics.setdefault(name, _Topic())
+                topic.times.append(1e-9 * message.log_time)
+                topic.stamps.append(row.pop(TIME_KEY, topic.times[-1]))
+                topic.rows.append(row)
     except Exception as problem:  # the library raises of many kinds on damaged files
         raise unreadable(path, "MCAP", problem) from problem
-    return channels, poses, other, encodings
+    if not topics and encodings & {"cdr", "ros1"}:
+        return read_bag(path, "", facts)
+    if not topics:
+        channels = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
+        raise refusal(path, channels, "messages in JSON")
+    if facts.topics is None and set(topics) > transforms:
+        other |= {name: "another topic" for name in transforms}
+        topics = {name: topic for name, topic in topics.items() if name not in transforms}
+    log = _joined(path, "mcap", "it begins with the magic bytes of MCAP", topics, facts, other)
+    words = ", ".join(sorted(set(other) - transforms))
+    return log.with_remarks(f"left out, no numbers in JSON: {words}") if words else log
 
 
 def _pose(content: dict[str, Any]) -> dict[str, Any]:
