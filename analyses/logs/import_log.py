@@ -115,6 +115,17 @@ def facts_of(
     return facts if mapping is None else with_mapping(facts, Path(mapping))
 
 
+OPTIONS = """log_format: Reader; auto says which and why.
+        unit: Units that the file does not state, as length=mm,force=N.
+        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
+            header; skip_rows, separator, rate_hz.
+        rate: Rows per second, for files without times [1/s].
+        body: Rigid body of a tracker that is the platform.
+        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
+        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y."""
+"""Arguments of the verbs that read a log."""
+
+
 @verb()
 def import_log(
     file: InputFile, /, *, out: OutFile = None,
@@ -138,17 +149,10 @@ def import_log(
         file: The log.
         out: CSV file to write.
         beside: Log of the same motion by another recorder.
-        log_format: Reader; auto says which and why.
+        OPTIONS
         with_format: Reader of the other log.
         robot: Robot whose cable names the columns take.
         cables: Names of the cables in the order of the log, as A,B,C,D.
-        unit: Units that the file does not state, as length=mm,force=N.
-        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
-            header; skip_rows, separator, rate_hz.
-        rate: Rows per second, for files without times [1/s].
-        body: Rigid body of a tracker that is the platform.
-        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
-        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
         start: First instant [s].
         until: Last instant [s].
         every: Keep every n-th row.
@@ -172,32 +176,34 @@ def import_log(
     facts = facts_of(cables, unit=unit, mapping=mapping, rate=rate, body=body, axes=axes,
                      topic=topic)  # fmt: skip
     log = without_packets(read_log(file, facts, log_format))
-    idle = _idle(log, facts)
+    unused = unused_facts(log, facts)
     if beside is not None:
         second = read_log(beside, replace(facts, mapping=None, skip_rows=0, separator=None),
                           with_format)  # fmt: skip
-        idle = [remark for remark in idle if remark in _idle(second, facts)]
+        unused = [remark for remark in unused if remark in unused_facts(second, facts)]
         log = join_logs(log, without_packets(second))
-    log = log.with_remarks(*(f"not used: {remark}" for remark in idle)).part(start, until, every)
+    log = log.with_remarks(*unused).part(start, until, every)
     if target is not None:
         log.write(target)
     return replace(log, written=target)
 
 
 READERS = "\n    ".join(f"- {name}: {how.title}" for name, how in DIALECTS.items())
-import_log.__doc__ = (import_log.__doc__ or "").replace("READERS", READERS)
+import_log.__doc__ = (
+    (import_log.__doc__ or "").replace("READERS", READERS).replace("OPTIONS", OPTIONS)
+)
 
 
-def _idle(log: Log, facts: Facts) -> list[str]:
-    """What was said beside a file and changed nothing, and why."""
-    idle = []
+def unused_facts(log: Log, facts: Facts) -> list[str]:
+    """Remarks on what a user said of a log that changed nothing, and why."""
+    unused = []
     if facts.rate is not None and not log.units.get("time", "").endswith(f"rows/s, {AS_TOLD}"):
-        idle.append(f"a rate of {facts.rate:g} 1/s, since the file has times")
+        unused.append(f"a rate of {facts.rate:g} 1/s, since the file has times")
     if facts.body is not None and log.dialect != "motive":
-        idle.append(f"the rigid body {facts.body}, since only motive files have some")
+        unused.append(f"the rigid body {facts.body}, since only motive files have some")
     if facts.topics is not None and log.dialect not in ("rosbag", "mcap"):
-        idle.append(f"the topics {', '.join(facts.topics)[:80]}, since only bags have some")
+        unused.append(f"the topics {', '.join(facts.topics)[:80]}, since only bags have some")
     stems = [name.removeprefix(COMMANDED).removeprefix(ESTIMATED) for name in log.frame]
     if facts.cables and not any(s.startswith(f"{c}_") for c in facts.cables for s in stems):
-        idle.append(f"the cables {', '.join(facts.cables)[:80]}, since no column is of one")
-    return idle
+        unused.append(f"the cables {', '.join(facts.cables)[:80]}, since no column is of one")
+    return [f"not used: {words}" for words in unused]

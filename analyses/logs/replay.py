@@ -35,12 +35,15 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.logs.columns import LENGTH, PARTS, POSITION, QUATERNION, SECONDS
 from cdpr_drake.analyses.logs.dialects import AUTO, read_log
 from cdpr_drake.analyses.logs.import_log import (
+    OPTIONS,
     Axes,
     LogFormat,
     MappingFile,
     Rate,
+    Topics,
     Units,
     facts_of,
+    unused_facts,
 )
 from cdpr_drake.analyses.logs.log import Log, refusal
 from cdpr_drake.analyses.logs.measurements import bind_log
@@ -301,8 +304,8 @@ def replay_log(
     log: InputFile, /, *, robot: RobotWord, fit_frame: Switch = False,
     drive: Annotated[bool, Parameter(name="--follow", negative=())] = False,
     log_format: LogFormat = AUTO, unit: Units = None, mapping: MappingFile = None,
-    rate: Rate = None, body: str | None = None, axes: Axes = None, out: OutFolder = None,
-    overwrite: Switch = False, formats: Formats = DEFAULT_FORMATS,
+    rate: Rate = None, body: str | None = None, topic: Topics = None, axes: Axes = None,
+    out: OutFolder = None, overwrite: Switch = False, formats: Formats = DEFAULT_FORMATS,
     follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
 ) -> Replay:  # fmt: skip
     """Replays a log of a machine beside a model of it, with residuals by cable.
@@ -319,13 +322,7 @@ def replay_log(
         fit_frame: Fit the tracker's frame to the positions that the model has for the measured
             lengths; without, the tracker measures in W.
         drive: Also drive the simulated robot with the log's cable lengths.
-        log_format: Reader; auto says which and why.
-        unit: Units that the file does not state, as length=mm,force=N.
-        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
-            header; skip_rows, separator, rate_hz.
-        rate: Rows per second, for files without times [1/s].
-        body: Rigid body of a tracker that is the platform.
-        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
+        OPTIONS
         out: Results folder; default: a new one below runs/; in Python nothing is kept.
         overwrite: Replace results in the folder.
         formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
@@ -338,12 +335,14 @@ def replay_log(
         OutputFolderError: The folder holds other results or files, or cannot be written.
     """
     loaded = as_robot(robot, "replay_log")
-    facts = facts_of(unit=unit, mapping=mapping, rate=rate, body=body, axes=axes)
+    facts = facts_of(unit=unit, mapping=mapping, rate=rate, body=body, axes=axes, topic=topic)
     facts = replace(facts, robot_cables=tuple(cable.name for cable in loaded.cables))
     recorded = read_log(log, facts, log_format)
+    recorded = recorded.with_remarks(*unused_facts(recorded, facts))
     arguments = {
         "log": str(log), "robot": loaded.name, "fit_frame": fit_frame, "follow": drive,
         "log_format": log_format, "unit": dict(unit or {}), "rate_hz": rate, "body": body,
+        "topics": None if topic is None else list(topic),
         "mapping": None if mapping is None else str(mapping),
         "axes": None if facts.R_WF is None else facts.R_WF.tolist(),
     }  # fmt: skip
@@ -359,6 +358,9 @@ def replay_log(
             replay = replace(replay, folder=folder.path)
             write_result(replay, folder, formats, follow, replay.pages())
     return replay
+
+
+replay_log.__doc__ = (replay_log.__doc__ or "").replace("OPTIONS", OPTIONS)
 
 
 def compare_log(robot: Robot, log: Log, fit_frame: bool = False) -> Replay:
