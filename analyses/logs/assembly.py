@@ -50,7 +50,7 @@ _ENDS = {"header": " by its header", "told": f", {AS_TOLD}", "dates": "",
 
 
 def assemble(
-    path: Path, dialect: str, why: str, columns: Sequence[tuple[str, Cells]], facts: Facts, *,
+    path: Path, columns: Sequence[tuple[str, Cells]], facts: Facts, *, why: str = "",
     shown: Sequence[str] | None = None, lines: Sequence[int] | None = None,
     units: dict[str, str] | None = None, remarks: Sequence[str] = (), cables: Sequence[str] = (),
     left_out: Mapping[str, str] | None = None, decimal: str = ".",
@@ -58,10 +58,11 @@ def assemble(
     """Makes a log of columns with headers, or refuses it.
 
     Args:
-        path, dialect, why: The file, the name of its dialect, and how that was recognised.
+        path: The file.
         columns: Headers of the file, or those that its dialect gives, with their cells; a column
             without a header is left out.
         facts: What the user says.
+        why: How the dialect was recognised, where it is not as `Dialect.knows` says.
         shown: Headers as they stand in the file; None: the same.
         lines: Line of the file in which each row stands, for messages; None: rows are counted.
         units: Units in words, where the dialect fixes them; None: each column says its own.
@@ -133,7 +134,7 @@ def assemble(
     ]
     ledger = pd.DataFrame(rows, columns=["header", "name", "kind", "unit", "by", "fate"])
     log = Log(
-        path=path, dialect=dialect, why=why, frame=_turned(pd.DataFrame(frame), facts.R_WF),
+        path=path, why=why, frame=_turned(pd.DataFrame(frame), facts.R_WF),
         ledger=ledger, units=said, remarks=(*statements, *_remarks(rows)),
     )  # fmt: skip
     return _settled(log, lines)

@@ -171,8 +171,9 @@ def join_logs(first: Log, second: Log) -> Log:
 
 def interpolate_poses(time: Array, table: Array, names: Sequence[str], at: Array) -> Array:
     """Columns at other instants, as `interpolate_rows`, where quaternions stay rotations."""
-    columns = [names.index(name) for name in PARTS[QUATERNION] if name in names]
-    if len(columns) == len(PARTS[QUATERNION]):  # they go on without a change of sign
+    columns = np.array([names.index(name) for name in PARTS[QUATERNION] if name in names])
+    whole = len(columns) == len(PARTS[QUATERNION])
+    if whole:  # they go on without a change of sign
         rows = np.flatnonzero(np.isfinite(table[:, columns]).all(axis=1))
         q = table[np.ix_(rows, columns)]
         turned = np.sum(q[1:] * q[:-1], axis=1) < 0.0
@@ -180,7 +181,7 @@ def interpolate_poses(time: Array, table: Array, names: Sequence[str], at: Array
         table = table.copy()
         table[np.ix_(rows, columns)] = q * sign[: len(q), None]
     table = interpolate_rows(time, table, at)
-    if len(columns) == len(PARTS[QUATERNION]):
+    if whole:
         q = table[:, columns]
         size = np.linalg.norm(q, axis=1, keepdims=True)
         table[:, columns] = q / np.where(q[:, :1] < 0.0, -size, size)

@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -91,13 +92,13 @@ def knows_columns(head: str) -> str:
     return f"its first row has the headers {', '.join(known[:3])}"
 
 
-def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
+def columns_log(path: Path, text: str, facts: Facts, patterns: Headers = ()) -> Log:
     """Text with columns, by its headers, the patterns of its dialect, or a mapping."""
     cells = read_cells(path, text, facts.separator, facts.skip_rows)
     rows, mapping, remarks = cells.rows, facts.mapping, list[str]()
     width, m = len(rows[0]), len(facts.cables or facts.robot_cables)
     headed = not all(is_number(cell, cells.decimal) for cell in rows[0])
-    why = "columns as the mapping says"
+    why = "" if mapping is None else "columns as the mapping says"
     if headed and len(rows) < 2:
         raise refusal(path, "a header without rows", "one row at least")
     if isinstance(mapping, dict) and headed:
@@ -112,8 +113,7 @@ def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
             )
         headers = list(mapping)
     elif headed:
-        why = DIALECTS[dialect].knows(text) or "it has headers"
-        headers = [renamed(cell, DIALECTS[dialect].columns) for cell in rows[0]]
+        headers = [renamed(cell, patterns) for cell in rows[0]]
     elif m and width in (m, 2 * m):  # as GRAB's tools write
         why = f"it has {width} columns of numbers for {m} cables"
         names = facts.cables or facts.robot_cables
@@ -126,7 +126,7 @@ def columns_log(path: Path, text: str, facts: Facts, dialect: str = CSV) -> Log:
         raise refusal(path, words, f"{lengths}a header, or a mapping with a list of columns")
     read = [j for j, header in enumerate(headers) if header]
     return assemble(
-        path, dialect, why, [(headers[j], [row[j] for row in rows[headed:]]) for j in read], facts,
+        path, [(headers[j], [row[j] for row in rows[headed:]]) for j in read], facts, why=why,
         shown=[rows[0][j] for j in read] if headed and mapping is None else None,
         lines=cells.lines[headed:], remarks=remarks, decimal=cells.decimal,
         left_out={
@@ -199,14 +199,16 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
         words = "a file that no reader of logs recognises"
         numbers = "columns of numbers without a header need a mapping"
         raise refusal(path, words, f"{', '.join(DIALECTS)}, named by log_format; {numbers}")
-    how = DIALECTS[name or CSV]
+    name = name or CSV
+    how = DIALECTS[name]
     text = "" if how.binary else read_text(path)
-    if dialect not in (AUTO, CSV) and not how.knows(read_bytes(path, HEAD) if how.binary else text):
-        start = "" if how.binary else f" {text[:30]!r} at the top"
-        raise LogFileError(f"{path}: found{start or ' other bytes'}; accepted: {how.title}")
-    if how.read is not None:
-        return how.read(path, text, facts)
-    return columns_log(path, text, facts, name or CSV)
+    why = how.knows(read_bytes(path, HEAD) if how.binary else text)
+    if dialect not in (AUTO, CSV) and not why:
+        start = "other bytes" if how.binary else f"{text[:30]!r} at the top"
+        raise refusal(path, start, how.title)
+    read = how.read or partial(columns_log, patterns=how.columns)
+    log = read(path, text, facts)
+    return replace(log, dialect=log.dialect or name, why=log.why or why or "it has headers")
 
 
 def recognise(path: Path) -> tuple[str, str]:

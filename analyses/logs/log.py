@@ -107,8 +107,8 @@ class Log(Result):
     """
 
     path: Path
-    dialect: str
-    why: str
+    dialect: str = ""
+    why: str = ""
     frame: pd.DataFrame
     ledger: pd.DataFrame
     units: dict[str, str] = field(default_factory=dict)

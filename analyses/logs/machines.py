@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number, plain_number
 from cdpr_drake.analyses.logs.columns import (
@@ -53,9 +54,8 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
 
     Forces have no unit there; they are kept as raw_force unless the user names one.
     """
-    why = knows_hangprinter(text)
     lines, decimal = None, "."
-    if "array" in why:
+    if "array" in knows_hangprinter(text):
         tables = {name: _series(path, text, name) for name in _ARRAYS}
         motors = tables["motor_pos_samp"]
         if not motors:
@@ -64,24 +64,22 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
         shown = {"motor_pos_samp": [f"motor_{letter}_deg" for letter in letters],
                  "xyz_of_samp": ["x_mm", "y_mm", "z_mm"],
                  "force_samp": [f"force_{letter}" for letter in letters]}  # fmt: skip
-        own, columns = list[str](), list[list[str]]()
         for name, rows in tables.items():
             wide = [row for row in rows if len(row) != len(shown[name])]
             if wide or len(rows) > len(motors):
                 words = f"{len(rows)} rows of {len((wide or rows)[0])}"
                 accepted = f"at most {len(motors)} of {len(shown[name])}"
                 raise refusal(f"{path}: {name}", words, accepted)
-            if rows:
-                rows += [[""] * len(shown[name])] * (len(motors) - len(rows))
-                own += shown[name]
-                columns += [list(column) for column in zip(*rows, strict=True)]
+        frames = [pd.DataFrame(rows, columns=shown[n]) for n, rows in tables.items() if rows]
+        frame = pd.concat(frames, axis=1).fillna("")
     else:
         cells = read_cells(path, text)
-        own, lines, decimal = cells.rows[0], cells.lines[1:], cells.decimal
-        columns = [list(column) for column in zip(*cells.rows[1:], strict=True)]
-        if not columns:
+        lines, decimal = cells.lines[1:], cells.decimal
+        frame = pd.DataFrame(cells.rows[1:], columns=cells.rows[0])
+        if frame.empty:
             raise refusal(path, "a header without rows", "one row at least")
-        letters = [found[1] for cell in own if (found := _MOTOR.fullmatch(cell))]
+        letters = [motor[1] for cell in frame if (motor := _MOTOR.fullmatch(cell))]
+    own, columns = list(frame), frame.to_numpy().T.tolist()
     names = facts.names(path, len(letters), letters)
     name_of = dict(zip(letters, names, strict=True))
     stated = "force" in facts.units
@@ -99,8 +97,8 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
     units |= {"positions": "mm by the format"} if "x_mm" in own else {}
     units |= {"forces": f"{facts.units['force']}, {AS_TOLD}"} if forces and stated else {}
     return assemble(
-        path, "hangprinter", why, list(zip(headers, columns, strict=True)), facts, shown=own,
-        lines=lines, units=units, cables=names, decimal=decimal,
+        path, list(zip(headers, columns, strict=True)), facts, shown=own, lines=lines, units=units,
+        cables=names, decimal=decimal,
         remarks=[_NO_FORCE_UNIT] if forces and not stated else [],
     )  # fmt: skip
 
@@ -181,9 +179,8 @@ def read_maslow(path: Path, text: str, facts: Facts) -> Log:
         for name, cable in zip(names, new, strict=True)
     ]
     return assemble(
-        path, "maslow", knows_maslow(text), columns, facts, shown=names, cables=new,
-        lines=[number for number, _ in series], units={"belts": "mm by the format"},
-        remarks=remarks,
+        path, columns, facts, shown=names, cables=new, lines=[number for number, _ in series],
+        units={"belts": "mm by the format"}, remarks=remarks,
     )  # fmt: skip
 
 
@@ -298,8 +295,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         "cables": ", ".join(f"{n} is actuator {key}" for n, key in zip(names, keys, strict=True)),
     }
     return assemble(
-        path, "grab", knows_grab(text), columns, facts, lines=at_line, units=units, cables=names,
-        remarks=remarks,
+        path, columns, facts, lines=at_line, units=units, cables=names, remarks=remarks,
         left_out=dict.fromkeys(unused + [f"type {kind}" for kind in sorted(other)], LEFT_OUT),
     )  # fmt: skip
 
@@ -355,8 +351,8 @@ def read_graffiti(path: Path, text: str, facts: Facts) -> Log:
     columns.append(("mode", table[:, 0]))
     remarks.append("x and y of the log are x and z of W; a wanted position 0, 0 is none")
     return assemble(
-        path, "gtgraffiti", knows_graffiti(text), columns, replace(facts, R_WF=None),
-        units={"lengths, positions": "m by the format"}, remarks=remarks, cables=names,
+        path, columns, replace(facts, R_WF=None), units={"lengths, positions": "m by the format"},
+        remarks=remarks, cables=names,
         left_out=dict.fromkeys(("error", "state", "speed"), LEFT_OUT),
     )  # fmt: skip
 

@@ -66,7 +66,7 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
     by = "m, rad, N, s by the format"
     by += "; epsilon_r in deg" if any("roll_deg" in headers for headers in wanted.values()) else ""
     return assemble(
-        path, "mat", f"it begins with {MAT.decode()}", list(columns.items()), facts,
+        path, list(columns.items()), facts,
         units={"variables": by if facts.mapping is None else "by the mapping"},
         remarks=[f"variables left out: {', '.join(rest)}"] if rest else [],
         left_out=dict.fromkeys(rest, LEFT_OUT),

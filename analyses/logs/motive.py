@@ -90,7 +90,7 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
             raise refusal(f"{path}:{cells.lines[k]}: quaternion", f"length {size[k]:.4g}", "1")
     shown = [" ".join(filter(None, (names[j], parts[j], axes[j]))) for j in range(len(axes))]
     return assemble(
-        path, "motive", knows_motive(text), list(columns.items()), facts, lines=cells.lines,
+        path, list(columns.items()), facts, lines=cells.lines,
         shown=[shown[j] for j in wanted.values()], units={"positions": words},
         remarks=_remarks(groups, body),
         left_out={shown[j]: LEFT_OUT for j in range(len(axes)) if j not in wanted.values()},

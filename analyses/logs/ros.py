@@ -9,8 +9,8 @@ Source: docs.ros.org, sensor_msgs, geometry_msgs, std_msgs; ternaris.gitlab.io/r
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ class _Topic:
         stamps = np.array(self.stamps)
         return stamps if np.all(np.diff(stamps) > 0) else np.array(self.times)
 
-    def keys(self) -> list[str]:
+    def fields(self) -> list[str]:
         """Fields, in the order of the longest message: what is not finite is in none of JSON."""
         longest = max(self.rows, key=len)
         return list(dict.fromkeys([*longest, *(key for row in self.rows for key in row)]))
@@ -95,22 +95,23 @@ def _need(path: Path, package: str, extra: str) -> None:
 def read_bag(path: Path, _: str, facts: Facts) -> Log:
     """Reads numbers of all topics, or of some, at the times of the one that measures cables."""
     _need(path, "rosbags", "ros")
-    return _joined(path, "rosbag", "it is a bag of ROS", _bag_topics(path), facts)
+    log = _joined(path, _bag_topics(path), facts, bag=True)
+    return replace(log, dialect="rosbag", why="it is a bag of ROS")
 
 
 def _joined(
-    path: Path, dialect: str, why: str, topics: dict[str, _Topic], facts: Facts,
-    other: Mapping[str, str] | None = None,
-) -> Log:  # fmt: skip
+    path: Path, topics: dict[str, _Topic], facts: Facts, bag: bool, other: Collection[str] = ()
+) -> Log:
     """One log of topics; fields of JSON are headers themselves, others have that of their topic."""
     missing = [name for name in facts.topics or () if name not in topics]
     chosen = {n: t for n, t in topics.items() if t.rows and n in (facts.topics or topics)}
     if missing or not any(row for topic in chosen.values() for row in topic.rows):
         accepted = f"some of {', '.join(topics)[:200] or 'a bag with messages'}"
         raise refusal(f"{path}: topic", (missing or ["no numbers"])[0], accepted)
-    bag = dialect == "rosbag"
     headers = {
-        name: {key: renamed(_header(name, key), ROS_COLUMNS) if bag else key for key in topic.keys()}
+        name: {
+            key: renamed(_header(name, key), ROS_COLUMNS) if bag else key for key in topic.fields()
+        }
         for name, topic in chosen.items()
     }
 
@@ -124,7 +125,7 @@ def _joined(
     start, scale = (int(chosen[first].clock()[0]), 1e-9) if bag else (0, 1.0)
     at = scale * (chosen[first].clock() - start)
     columns: list[tuple[str, Cells]] = [(SECONDS, at)]
-    shown, left_out = [first if bag else SECONDS], dict(other or {})
+    shown, left_out = [first if bag else SECONDS], dict[str, str]()
     remarks = [f"times count from the first message of {first}, {start} ns"] if bag else []
     for name, topic in chosen.items():
         keys = [key for key, header in headers[name].items() if header]
@@ -140,9 +141,9 @@ def _joined(
         joints = ", ".join(f"{k} is {joint}" for k, joint in enumerate(topic.joints))
         remarks += [f"joints of {name}: {joints}"] if joints else []
     left_out |= {name: "another topic" for name in topics if name not in chosen}
-    return assemble(
-        path, dialect, why, columns, facts, shown=shown, remarks=remarks, left_out=left_out
-    )
+    left_out |= dict.fromkeys(sorted(other), "no numbers in JSON")
+    remarks += [f"left out, no numbers in JSON: {', '.join(sorted(other))}"] if other else []
+    return assemble(path, columns, facts, shown=shown, remarks=remarks, left_out=left_out)
 
 
 def _bag_topics(path: Path) -> dict[str, _Topic]:
@@ -202,13 +203,14 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
     from mcap.reader import make_reader
 
     topics: dict[str, _Topic] = {}
-    transforms, other, encodings = set[str](), dict[str, str](), set[str]()
+    transforms, other, encodings = set[str](), set[str](), set[str]()
     try:
         with path.open("rb") as stream:
             for schema, channel, message in make_reader(stream).iter_messages():
                 encodings.add(channel.message_encoding)
                 json = channel.message_encoding == "json"
-                content, name = load_json(message.data) if json else None, channel.topic
+                content: Any = load_json(message.data) if json else None
+                name = channel.topic
                 if json and schema is not None and schema.name == TRANSFORM:
                     name = f"{name} of {content['child_frame_id']}"
                     transforms.add(name)
@@ -217,7 +219,7 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
                     value is not None and type(value) not in (int, float)
                     for value in content.values()
                 ):
-                    other[name] = "no numbers in JSON"
+                    other.add(name)
                     continue
                 row = {key: float(value) for key, value in content.items() if value is not None}
                 topic = topics.setdefault(name, _Topic())
@@ -232,11 +234,8 @@ def read_mcap(path: Path, _: str, facts: Facts) -> Log:
         channels = f"channels {', '.join(sorted(other))[:120]}" if other else "no messages"
         raise refusal(path, channels, "messages in JSON")
     if facts.topics is None and set(topics) > transforms:
-        other |= {name: "another topic" for name in transforms}
-        topics = {name: topic for name, topic in topics.items() if name not in transforms}
-    log = _joined(path, "mcap", "it begins with the magic bytes of MCAP", topics, facts, other)
-    words = ", ".join(sorted(set(other) - transforms))
-    return log.with_remarks(f"left out, no numbers in JSON: {words}") if words else log
+        facts = replace(facts, topics=tuple(name for name in topics if name not in transforms))
+    return _joined(path, topics, facts, False, other)
 
 
 def _pose(content: dict[str, Any]) -> dict[str, Any]:
