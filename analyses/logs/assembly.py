@@ -42,6 +42,7 @@ EPOCH = 1e8
 """Larger times are dates: they are counted from the first row [s]."""
 
 READ, WORDS, WORSE, LEFT_OUT = "read", "words", "worse", "left out"
+NO_UNIT = "is no unit that is known"
 """Fates of columns; others are in words."""
 
 _ENDS = {"header": " by its header", "told": f", {AS_TOLD}", "dates": "",
@@ -101,7 +102,7 @@ def assemble(
         name, factor = header, 1.0
         if column is None:
             unit = unknown_unit(header, names, first)
-            row["fate"] = f"{unit} is no unit that is known" if unit else "unknown"
+            row["fate"] = f"{unit} {NO_UNIT}" if unit else "unknown"
         else:
             name, row["kind"], row["fate"] = column.name, column.kind, READ
             row["unit"], row["by"], factor = _unit(
@@ -128,11 +129,8 @@ def assemble(
         said["time"] = f"{facts.rate:g} rows/s, {AS_TOLD}"
     if facts.R_WF is not None:
         said["axes"] = _axes_words(facts.R_WF)
-    rows += [
-        dict.fromkeys(("name", "kind", "unit", "by"), "") | {"header": header, "fate": fate}
-        for header, fate in (left_out or {}).items()
-    ]
-    ledger = pd.DataFrame(rows, columns=["header", "name", "kind", "unit", "by", "fate"])
+    rows += [{"header": header, "fate": fate} for header, fate in (left_out or {}).items()]
+    ledger = pd.DataFrame(rows, columns=["header", "name", "kind", "unit", "by", "fate"]).fillna("")
     log = Log(
         path=path, why=why, frame=_turned(pd.DataFrame(frame), facts.R_WF),
         ledger=ledger, units=said, remarks=(*statements, *_remarks(rows)),
@@ -145,39 +143,31 @@ def numbers(cells: Cells, decimal: str = ".") -> tuple[Array, int | None]:
     try:
         values = np.array(cells, float)
     except ValueError:
-        words = [plain_number(cell, decimal) for cell in cells]
-        bad = next((k for k, word in enumerate(words) if not _is_float(word)), None)
-        values = np.full(len(words), np.nan) if bad is not None else np.array(words, float)
-        if bad is not None:
-            return values, bad
+        parsed = [_number(cell, decimal) for cell in cells]
+        if None in parsed:
+            return np.full(len(parsed), np.nan), parsed.index(None)
+        values = np.array(parsed, float)
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     return values, int(beyond[0]) if len(beyond) else None
 
 
-def plain_number(cell: str, decimal: str = ".") -> str:
-    """A cell as Python writes numbers, without the marks of thousands."""
+def _number(cell: str, decimal: str) -> float | None:
+    """Number of a cell, without marks of thousands, NaN if nothing was measured; None: words."""
     word = cell.strip()
-    if word.lower() in NO_NUMBER:
-        return "nan"
     if decimal == "," and "," in word:
         word = re.sub(r"\.(?=\d{3}(\D|$))", "", word).replace(",", ".")
     elif re.fullmatch(r"[+-]?\d{1,3}(,\d{3})+(\.\d*)?", word):
         word = word.replace(",", "")
-    return word
-
-
-def is_number(cell: str, decimal: str = ".") -> bool:
-    """True for a cell with a number, or of what was not measured."""
-    word = plain_number(cell, decimal)
-    return _is_float(word) and not abs(float(word)) > LARGEST
-
-
-def _is_float(word: str) -> bool:
     try:
-        float(word)
+        return float("nan" if word.lower() in NO_NUMBER else word)
     except ValueError:
-        return False
-    return True
+        return None
+
+
+def is_number(cell: str, decimal: str = ".", finite: bool = False) -> bool:
+    """True for a cell with a number, or, unless it must be finite, of what was not measured."""
+    value = _number(cell, decimal)
+    return value is not None and (abs(value) <= LARGEST if finite else not abs(value) > LARGEST)
 
 
 def _rank(row: Mapping[str, str], values: Array) -> int:
@@ -244,10 +234,12 @@ def _remarks(rows: Sequence[Mapping[str, str]]) -> list[str]:
         (WORDS, "columns with words were left out"),
         (WORSE, "left out, since what is measured, or what winches count, stands for them"),
     ):
-        headers = [row["header"] for row in rows if row["fate"] == fate]
-        remarks += [f"{words}: {', '.join(headers)}"] if headers else []
-    doubt = [row for row in rows if row["fate"].endswith("is no unit that is known")]
-    return remarks + [f"kept as it is: {row['header']}, {row['fate']}" for row in doubt]
+        headers = ", ".join(row["header"] for row in rows if row["fate"] == fate)
+        remarks += [f"{words}: {headers}"] if headers else []
+    return remarks + [
+        f"kept as it is: {row['header']}, {row['fate']}"
+        for row in rows if row["fate"].endswith(NO_UNIT)
+    ]  # fmt: skip
 
 
 def _turned(frame: pd.DataFrame, R_WF: Array | None) -> pd.DataFrame:
@@ -256,20 +248,16 @@ def _turned(frame: pd.DataFrame, R_WF: Array | None) -> pd.DataFrame:
         return frame
     stems = [name.removesuffix("x_m") for name in frame if name.endswith("x_m")]
     groups = [[f"{stem}{axis}_m" for axis in "xyz"] for stem in stems]
-    whole = all(name in frame for name in PARTS[QUATERNION])
-    for names in [*groups, *([list(PARTS[QUATERNION][1:])] if whole else [])]:
-        if all(name in frame for name in names):
-            turned = R_WF @ frame[names].to_numpy().T
-            frame = frame.assign(**dict(zip(names, turned, strict=True)))
+    groups += [list(PARTS[QUATERNION][1:])] if set(PARTS[QUATERNION]) <= set(frame) else []
+    for names in groups:
+        if set(names) <= set(frame):
+            frame[names] = (R_WF @ frame[names].to_numpy().T).T
     return frame
 
 
 def _axes_words(R_WF: Array) -> str:
-    axes = []
-    for row in R_WF:
-        k = int(np.argmax(np.abs(row)))
-        axes.append(f"{'-' if row[k] < 0.0 else ''}{'xyz'[k]}")
-    return f"x, y, z of W are {', '.join(axes)} of the file"
+    signs = ["-" * bool(row.sum() < 0.0) + "xyz"[np.argmax(np.abs(row))] for row in R_WF]
+    return f"x, y, z of W are {', '.join(signs)} of the file"
 
 
 def _settled(log: Log, lines: Sequence[int] | None) -> Log:
@@ -279,9 +267,8 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
         raise refusal(path, "no rows of measurements", "at least one")
     if time is None:
         return log
-    finite = np.isfinite(time)
-    if not finite.all():
-        place = _place(lines, int(np.argmin(finite)))
+    if not np.isfinite(time).all():
+        place = _place(lines, int(np.argmin(np.isfinite(time))))
         raise refusal(f"{path}:{place}: time", "no number", "a time in each row")
     twice = np.concatenate([[False], same_as_before(log.frame.to_numpy(float))])
     rows = np.flatnonzero(~twice)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number, plain_number
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
 from cdpr_drake.analyses.logs.columns import (
     COMMANDED,
     ESTIMATED,
@@ -304,7 +304,7 @@ def _line_numbers(path: Path, number: int, cells: list[str], width: int) -> list
     if len(cells) != width:
         raise refusal(f"{path}:{number}", f"{len(cells)} cells of type {cells[0]}", width)
     for j, cell in enumerate(cells):
-        if not is_number(cell) or plain_number(cell) == "nan":
+        if not is_number(cell, finite=True):
             raise refusal(f"{path}:{number}: cell {j + 1}", f"{cell[:30]!r}", "a finite number")
     return [float(cell) for cell in cells]
 
@@ -364,5 +364,5 @@ def _graffiti_cells(line: str) -> list[float] | None:
     if start is None or len(parts) < 4 or any(len(part.split()) != 4 for part in parts[1:-1]):
         return None
     cells = [*start.groups(), *(cell for part in parts[1:-1] for cell in part.split())]
-    known = all(is_number(cell) and plain_number(cell) != "nan" for cell in cells)
+    known = all(is_number(cell, finite=True) for cell in cells)
     return [float(cell) for cell in cells] if known else None
