@@ -41,6 +41,9 @@ NO_NUMBER = {"", "nan", "na", "n/a", "null", "none", "-"}
 EPOCH = 1e8
 """Larger times are dates: they are counted from the first row [s]."""
 
+_TURN = 1e-2
+"""Largest difference of the length of a quaternion from 1."""
+
 READ, WORDS, WORSE, LEFT_OUT = "read", "words", "worse", "left out"
 NO_UNIT = "is no unit that is known"
 """Fates of columns; others are in words."""
@@ -149,6 +152,15 @@ def numbers(cells: Cells, decimal: str = ".") -> tuple[Array, int | None]:
         values = np.array(parsed, float)
     beyond = np.flatnonzero(np.abs(values) > LARGEST)
     return values, int(beyond[0]) if len(beyond) else None
+
+
+def refuse_other_lengths(path: Path, q: Array, lines: Sequence[int] | None = None) -> None:
+    """Refuses quaternions, shape (k, 4), that are no rotations."""
+    size = np.linalg.norm(q, axis=1)
+    off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
+    if len(off):
+        place = f"{path}:{_place(lines, int(off[0]))}: quaternion"
+        raise refusal(place, f"length {size[off[0]]:.4g}", "1")
 
 
 def _number(cell: str, decimal: str) -> float | None:

@@ -33,7 +33,6 @@ from cdpr_drake.models.robot_loader import as_robot
 
 def checked_units(units: Mapping[str, str]) -> dict[str, str]:
     """Units by dimension, in small letters."""
-    checked = {}
     for dimension, unit in units.items():
         known = [name for name, (of, _) in UNITS.items() if of == dimension]
         if not known:
@@ -42,18 +41,16 @@ def checked_units(units: Mapping[str, str]) -> dict[str, str]:
         if unit.lower() not in known:
             accepted = accepted_names(unit, known)
             raise LogFileError(f"unit of {dimension}: found {unit!r}; {accepted}")
-        checked[dimension] = unit.lower()
-    return checked
+    return {dimension: unit.lower() for dimension, unit in units.items()}
 
 
 def axes_rotation(word: str) -> Array:
     """R_WF from which axes of the file x, y and z of W are, as `z,x,y` or `-z,-x,y`."""
-    R = np.zeros((3, 3))
     parts = [part.strip().lower() for part in word.split(",")]
-    for row, part in enumerate(parts[:3]):
-        name = part.lstrip("+-")
-        if name in ("x", "y", "z"):
-            R[row, "xyz".index(name)] = -1.0 if part.startswith("-") else 1.0
+    R = np.array([
+        [(-1.0 if part.startswith("-") else 1.0) * (part.lstrip("+-") == axis) for axis in "xyz"]
+        for part in parts
+    ])  # fmt: skip
     if len(parts) != 3 or not np.isclose(np.linalg.det(R), 1.0):
         accepted = "the axes of the file that are x, y and z of W, right-handed, as z,x,y or x,-z,y"
         raise refusal("axes", repr(word), accepted)
@@ -64,7 +61,7 @@ def _units(word: str) -> dict[str, str]:
     pairs = [item.strip().partition("=") for item in word.split(",")]
     if not all(mark for _, mark, _ in pairs):
         raise ValueError(word)
-    return checked_units({dimension: unit for dimension, _, unit in pairs})
+    return {dimension: unit for dimension, _, unit in pairs}
 
 
 def _topics(word: str) -> list[str]:
@@ -72,13 +69,6 @@ def _topics(word: str) -> list[str]:
     if not all(topic.startswith("/") for topic in topics):
         raise ValueError(word)
     return topics
-
-
-def _rate(word: str) -> float:
-    rate = float(word)
-    if not 0.0 < rate < np.inf:
-        raise ValueError(word)
-    return rate
 
 
 LogFormat: TypeAlias = Annotated[str, one_of((*DIALECTS, AUTO))]
@@ -89,7 +79,7 @@ Units: TypeAlias = Annotated[
 MappingFile: TypeAlias = Annotated[
     Path | str | None, words(Path, "the path of a YAML file", "FILE")
 ]
-Rate: TypeAlias = Annotated[float | None, words(_rate, "above 0 [1/s]", "RATE")]
+Rate: TypeAlias = Annotated[float | None, words(float, "above 0 [1/s]", "RATE")]
 Axes: TypeAlias = Annotated[Any, words(axes_rotation, "three axes, as -z,-x,y", "AXIS,AXIS,AXIS")]
 Topics: TypeAlias = Annotated[
     Sequence[str] | None, words(_topics, "topics with commas, as /tracker/pose", "TOPIC,...")
@@ -164,11 +154,11 @@ def import_log(
         OutputFolderError: The file to write is one of the logs, is there, or cannot be written.
     """
     target = None if out is None else Path(out)
-    for source in (file, beside):
-        if target is not None and source is not None and target.resolve() == Path(source).resolve():
+    if target is not None:
+        if target.resolve() in [Path(source).resolve() for source in (file, beside) if source]:
             raise OutputFolderError(f"out: found {out}, the log itself; accepted: another file")
-    if target is not None and target.exists() and not overwrite:
-        raise OutputFolderError(f"out: found {out}; accepted: a new file, or add overwrite")
+        if target.exists() and not overwrite:
+            raise OutputFolderError(f"out: found {out}; accepted: a new file, or add overwrite")
     if robot is not None and cables is not None:
         raise CdprError("cables: found with robot; accepted: one of them")
     if robot is not None:

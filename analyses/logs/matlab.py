@@ -54,10 +54,15 @@ def read_mat(path: Path, _: str, facts: Facts) -> Log:
     count = max(len(table) for table in tables.values())
     columns: dict[str, Cells] = {}
     for name, headers in wanted.items():
-        table = tables[name]
+        table, width = tables[name], tables[name].shape[1]
         if len(table) != count:
             raise refusal(f"{path}: {name}", f"{len(table)} rows", f"{count}, as the others have")
-        for header, column in zip(_spread(path, name, headers, table, facts), table.T, strict=True):
+        if len(headers) == 1 and "{c}" in headers[0]:
+            headers = [headers[0].replace("{c}", cable) for cable in facts.names(path, width)]
+        if len(headers) != width:
+            words = f"{len(headers)}: {', '.join(headers)}"
+            raise refusal(f"{path}: {name}", f"{width} columns", words)
+        for header, column in zip(headers, table.T, strict=True):
             if header in columns:
                 raise refusal(f"{path}: {name}", f"{header} twice", "once")
             columns[header] = column
@@ -91,12 +96,9 @@ def _wanted(path: Path, variables: dict[str, Any], facts: Facts) -> dict[str, li
         raise refusal(f"{path}: mapping: columns", "a list", "variable: header")
     if mapping is None:
         last = {name: name.rpartition(".")[2] for name in variables}
-        known = {
-            name: GRAB_VARIABLES.get(word) or GRAB_VARIABLES.get(word.removesuffix("_r"))
-            for name, word in last.items()
-        }
-        mapping = {name: headers for name, headers in known.items() if headers}
-        mapping = mapping if len(mapping) > 1 else {}
+        known = {n: GRAB_VARIABLES.get(w, GRAB_VARIABLES.get(w.removesuffix("_r"), ""))
+                 for n, w in last.items()}  # fmt: skip
+        mapping = known if len(list(filter(None, known.values()))) > 1 else {}
     missing = [name for name in mapping if name not in variables]
     wanted = {name: headers for name, headers in mapping.items() if headers}
     if missing or not wanted:
@@ -118,15 +120,3 @@ def _table(path: Path, name: str, value: Any) -> Array:
     if table.ndim != 2:
         raise refusal(f"{path}: {name}", f"shape {table.shape}", "rows and columns")
     return table.T if table.shape[0] < table.shape[1] else table
-
-
-def _spread(path: Path, name: str, headers: list[str], table: Array, facts: Facts) -> list[str]:
-    """A header for each column of a variable."""
-    width = table.shape[1]
-    if len(headers) == 1 and "{c}" in headers[0]:
-        return [headers[0].replace("{c}", cable) for cable in facts.names(path, width)]
-    if len(headers) != width:
-        raise refusal(
-            f"{path}: {name}", f"{width} columns", f"{len(headers)}: {', '.join(headers)}"
-        )
-    return headers

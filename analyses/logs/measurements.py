@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pandas as pd
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, READ
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, READ, refuse_other_lengths
 from cdpr_drake.analyses.logs.columns import (
     ANGLES,
     CABLE_QUANTITIES,
@@ -47,9 +47,6 @@ _NOT_FITTED = (COMMANDED.strip("_"), ESTIMATED.strip("_"), MARKERS)
 
 _SAID_OTHERWISE = "columns with words|left out, since|the unit of the forces"
 """Remarks of logs on columns that are not read; measurements have one remark on all of them."""
-
-_TURN = 1e-2
-"""Largest difference of the length of a quaternion from 1."""
 
 Columns: TypeAlias = Mapping[str, Array] | pd.DataFrame
 """Columns by name."""
@@ -325,10 +322,7 @@ def _rotations(path: Path, kind: str, columns: Columns) -> list[RotationMatrix |
     """Rotations of each row; None in rows without."""
     table = _whole(path, kind, columns)
     if kind == QUATERNION:
-        size = np.linalg.norm(table, axis=1)
-        off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
-        if len(off):
-            raise refusal(f"{path}: row {off[0] + 1}: quaternion", f"length {size[off[0]]:g}", "1")
+        refuse_other_lengths(path, table)
     make: Callable[[Array], RotationMatrix] = {
         QUATERNION: _of_quaternion, TAIT: rotation_from_angles, TURN: rotation_from_vector,
         RPY: lambda values: RotationMatrix(RollPitchYaw(values)),

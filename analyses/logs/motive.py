@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, numbers
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, numbers, refuse_other_lengths
 from cdpr_drake.analyses.logs.columns import PARTS, QUATERNION, SECONDS
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.analyses.logs.text import Cells, read_cells
@@ -25,9 +25,6 @@ _UNITS = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 
 _MOST_HEAD = 12
 """Lines above the rows; there are seven or eight."""
-
-_TURN = 1e-2
-"""Largest difference of the length of a quaternion from 1."""
 
 _POSITION = tuple(f"Position {axis}" for axis in "XYZ")
 _PARTS = {
@@ -51,14 +48,14 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
     place = next((k for k, line in enumerate(lines[:_MOST_HEAD]) if line.startswith("Frame,")), -1)
     if place < 0:
         raise refusal(path, "no line that begins with Frame", "one above rows")
-    axes = _split(lines[place])
-    head = [(_split(line) + [""] * len(axes))[: len(axes)]
-            for line in lines[1:place] if line.strip(", \t")]  # fmt: skip
+    pairs, *above, axes = (
+        [cell.strip().strip('"') for cell in line.split(",")] for line in lines[: place + 1]
+    )
+    head = [(row + [""] * len(axes))[: len(axes)] for row in above if any(row)]
     types = next((row for row in head if any(BODY in c or c == MARKER for c in row)), None)
     parts = next((row for row in head if "Position" in row), None)
     if types is None or parts is None:
         raise refusal(path, "no types or no Position above the rows", "both")
-    pairs = _split(lines[0])
     settings = dict(zip(pairs[::2], pairs[1::2], strict=False))
     if settings.get("Rotation Type", "Quaternion") != "Quaternion":
         raise refusal(f"{path}: Rotation Type", settings["Rotation Type"], "Quaternion")
@@ -71,23 +68,17 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
     body = _platform(path, groups, cells, facts)
     wanted = {SECONDS: 1}
     if body:
-        of_body = groups[BODY, body]
-        wanted |= {f"{axis.lower()}_{unit}": of_body[f"Position {axis}"] for axis in "XYZ"}
-        wanted |= {f"q{axis.lower()}": of_body[f"Rotation {axis}"] for axis in "WXYZ"}
-    for (kind, name), of_marker in groups.items():
-        if kind == MARKER and _rows_with(cells, of_marker[_POSITION[0]]):
-            word = re.sub(r"\W+", "_", name).strip("_")
-            for axis in "XYZ":
-                header = f"marker_{word}_{axis.lower()}_{unit}"
-                wanted[header] = of_marker[f"Position {axis}"]
+        part = groups[BODY, body]
+        wanted |= {f"{axis.lower()}_{unit}": part[f"Position {axis}"] for axis in "XYZ"}
+        wanted |= {f"q{axis.lower()}": part[f"Rotation {axis}"] for axis in "WXYZ"}
+    for (kind, name), part in groups.items():
+        if kind == MARKER and _rows_with(cells, part):
+            stem = "marker_" + re.sub(r"\W+", "_", name).strip("_")
+            wanted |= {f"{stem}_{a.lower()}_{unit}": part[f"Position {a}"] for a in "XYZ"}
     columns = {header: [row[j] for row in cells.rows] for header, j in wanted.items()}
     if body:
-        q = np.array([numbers(columns[name])[0] for name in PARTS[QUATERNION]])
-        size = np.linalg.norm(q, axis=0)
-        off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
-        if len(off):
-            k = off[0]
-            raise refusal(f"{path}:{cells.lines[k]}: quaternion", f"length {size[k]:.4g}", "1")
+        q = np.column_stack([numbers(columns[name])[0] for name in PARTS[QUATERNION]])
+        refuse_other_lengths(path, q, cells.lines)
     shown = [" ".join(filter(None, (names[j], parts[j], axes[j]))) for j in range(len(axes))]
     return assemble(
         path, list(columns.items()), facts, lines=cells.lines,
@@ -95,10 +86,6 @@ def read_motive(path: Path, text: str, facts: Facts) -> Log:
         remarks=_remarks(groups, body),
         left_out={shown[j]: LEFT_OUT for j in range(len(axes)) if j not in wanted.values()},
     )  # fmt: skip
-
-
-def _split(line: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in line.split(",")]
 
 
 def _unit(path: Path, settings: dict[str, str], facts: Facts) -> tuple[str, str]:
@@ -131,17 +118,15 @@ def _groups(path: Path, types: list[str], names: list[str], parts: list[str]) ->
     return groups
 
 
-def _rows_with(cells: Cells, column: int) -> int:
-    """Number of rows that have something in a column."""
-    return sum(bool(row[column]) for row in cells.rows)
+def _rows_with(cells: Cells, part: dict[str, int]) -> int:
+    """Number of rows in which a body or marker was seen."""
+    return sum(bool(row[part[_POSITION[0]]]) for row in cells.rows)
 
 
 def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:
     """Name of the rigid body that is the platform; empty where there are markers alone."""
-    bodies = {
-        name: _rows_with(cells, present[_POSITION[0]])
-        for (kind, name), present in groups.items() if kind == BODY
-    }  # fmt: skip
+    bodies = {name: _rows_with(cells, part)
+              for (kind, name), part in groups.items() if kind == BODY}  # fmt: skip
     words = ", ".join(f"{name!r} ({count} rows)" for name, count in bodies.items())
     if facts.body is not None:
         if facts.body not in bodies:

@@ -56,9 +56,8 @@ def read_text(path: Path) -> str:
     try:
         text = plain_text(read_bytes(path))
     except UnicodeDecodeError as problem:
-        raise refusal(
-            path, f"byte {problem.start} that is not of {problem.encoding}", "text in UTF-8"
-        ) from problem
+        words = f"byte {problem.start} that is not of {problem.encoding}"
+        raise refusal(path, words, "text in UTF-8") from problem
     if text is None:
         raise refusal(path, "bytes that are no text", "text")
     return text
@@ -89,11 +88,10 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
     separator = separator or separator_of(numbered[0][1])
     lines = [number for number, _ in numbered]
     try:
-        if separator is None:
-            rows = [line.split() for _, line in numbered]
-        else:
-            found = csv.reader([line for _, line in numbered], delimiter=separator)
-            rows = [[cell.strip() for cell in row] for row in found]
+        rows = [line.split() for _, line in numbered]
+        if separator is not None:
+            table = csv.reader([line for _, line in numbered], delimiter=separator)
+            rows = [[cell.strip() for cell in row] for row in table]
     except csv.Error as problem:
         raise LogFileError(f"{path}: cannot be read as a table: {problem}") from problem
     if len(rows) != len(lines):
@@ -103,9 +101,8 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
         while len(row) > width and not row[-1]:  # a separator at the end of the line
             row.pop()
         if len(row) != width:
-            raise refusal(
-                f"{path}:{number}", f"{len(row)} cells", f"{width}, as in line {lines[0]}"
-            )
+            words = f"{width}, as in line {lines[0]}"
+            raise refusal(f"{path}:{number}", f"{len(row)} cells", words)
     return Cells(rows, lines, _decimal(rows, separator))
 
 
@@ -113,31 +110,27 @@ def _decimal(rows: Sequence[Sequence[str]], separator: str | None) -> str:
     """A comma if some cells have one, none has a point, and something else separates cells."""
     if separator == ",":
         return "."
-    cells = [cell for row in rows[:200] for cell in row]
-    comma = r"[+-]?(\d{1,3}(\.\d{3})+|\d*),\d+([eE][+-]?\d+)?"
-    point = r"[+-]?(\d{1,3}(,\d{3})+|\d*)\.\d+([eE][+-]?\d+)?"
+    number = r"[+-]?(\d{{1,3}}({0}\d{{3}})+|\d*){1}\d+([eE][+-]?\d+)?"
     with_comma, with_point = (
-        any(re.fullmatch(pattern, cell) for cell in cells) for pattern in (comma, point)
+        any(re.fullmatch(pattern, cell) for row in rows[:200] for cell in row)
+        for pattern in (number.format(r"\.", ","), number.format(",", r"\."))
     )
     return "," if with_comma and not with_point else "."
 
 
 class _Mapping(BaseModel):
-    """Content of a mapping file."""
+    """Content of a mapping file; descriptions are what is accepted."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 
-    columns: list[str | None] | dict[str, str | None] = Field(min_length=1)
-    skip_rows: int = Field(0, ge=0)
-    separator: str | None = Field(None, pattern=r'^[^"\n\r.]$')
-    rate_hz: float | None = Field(None, gt=0.0, allow_inf_nan=False)
-
-
-_ACCEPTED = {
-    "columns": "a list of headers with their units, as [time_s, C1_length_mm, ''], or name: header",
-    "skip_rows": "a whole number from 0", "separator": "one sign, as ';'",
-    "rate_hz": "a number above 0",
-}  # fmt: skip
+    columns: list[str | None] | dict[str, str | None] = Field(
+        min_length=1,
+        description="a list of headers with their units, as [time_s, C1_length_mm, ''], or name: "
+        "header",
+    )
+    skip_rows: int = Field(0, ge=0, description="a whole number from 0")
+    separator: str | None = Field(None, pattern=r'^[^"\n\r.]$', description="one sign, as ';'")
+    rate_hz: float | None = Field(None, gt=0.0, allow_inf_nan=False, description="a number above 0")
 
 
 def with_mapping(facts: Facts, path: Path) -> Facts:
@@ -146,24 +139,21 @@ def with_mapping(facts: Facts, path: Path) -> Facts:
         if file_size(path) > MOST_MAPPING:
             raise refusal(path, f"more than {MOST_MAPPING:,} bytes", "fewer")
         content = load_yaml(path.read_text(encoding="utf-8"))
+        mapping = _Mapping.model_validate(content)
+    except ValidationError as problem:
+        key, known = str((*problem.errors()[0]["loc"], "columns")[0]), _Mapping.model_fields
+        if key not in known:
+            raise LogFileError(f"{path}: found {key!r}; {accepted_names(key, known)}") from problem
+        value = content.get(key) if isinstance(content, dict) else content
+        raise refusal(f"{path}: {key}", str(value)[:80], known[key].description) from problem
     except (OSError, ValueError) as problem:
         words = " ".join(why_not_read(problem).split())
         raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
-    try:
-        mapping = _Mapping.model_validate(content)
-    except ValidationError as problem:
-        key = str((*problem.errors()[0]["loc"], "columns")[0])
-        if key not in _ACCEPTED:
-            accepted = accepted_names(key, _ACCEPTED)
-            raise LogFileError(f"{path}: found {key!r}; {accepted}") from problem
-        value = content.get(key) if isinstance(content, dict) else content
-        raise refusal(f"{path}: {key}", str(value)[:80], _ACCEPTED[key]) from problem
     headers: Any = mapping.columns
-    if isinstance(headers, dict):
-        headers = {name: header or "" for name, header in headers.items()}
-    else:
-        headers = [header or "" for header in headers]
+    named = isinstance(headers, dict)
     return replace(
-        facts, mapping=headers, skip_rows=mapping.skip_rows, separator=mapping.separator,
+        facts, skip_rows=mapping.skip_rows, separator=mapping.separator,
+        mapping={name: header or "" for name, header in headers.items()} if named
+        else [header or "" for header in headers],
         rate=mapping.rate_hz if facts.rate is None else facts.rate,
     )  # fmt: skip
