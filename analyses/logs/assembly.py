@@ -99,7 +99,7 @@ def assemble(
             row["fate"] = WORDS
             continue
         if bad is not None:
-            place = f"{path}:{_place(lines, bad)}: {own[:40]}"
+            place = f"{_place(path, lines, bad)}: {own[:40]}"
             accepted = f"a number up to {LARGEST:g}, or an empty cell"
             raise refusal(place, repr(str(cells[bad])[:40]), accepted)
         name, factor = header, 1.0
@@ -159,7 +159,7 @@ def refuse_other_lengths(path: Path, q: Array, lines: Sequence[int] | None = Non
     size = np.linalg.norm(q, axis=1)
     off = np.flatnonzero(np.abs(size - 1.0) > _TURN)
     if len(off):
-        place = f"{path}:{_place(lines, int(off[0]))}: quaternion"
+        place = f"{_place(path, lines, int(off[0]))}: quaternion"
         raise refusal(place, f"length {size[off[0]]:.4g}", "1")
 
 
@@ -280,8 +280,8 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
     if time is None:
         return log
     if not np.isfinite(time).all():
-        place = _place(lines, int(np.argmin(np.isfinite(time))))
-        raise refusal(f"{path}:{place}: time", "no number", "a time in each row")
+        place = _place(path, lines, int(np.argmin(np.isfinite(time))))
+        raise refusal(f"{place}: time", "no number", "a time in each row")
     twice = np.concatenate([[False], same_as_before(log.frame.to_numpy(float))])
     rows = np.flatnonzero(~twice)
     back = np.flatnonzero(np.diff(time[rows]) <= 0.0)
@@ -289,10 +289,10 @@ def _settled(log: Log, lines: Sequence[int] | None) -> Log:
         before, after = rows[back[0]], rows[back[0] + 1]
         words = f"{time[after]:.9g} s after {time[before]:.9g} s"
         accepted = "times that grow, and rows twice only where all of them is the same"
-        raise refusal(f"{path}:{_place(lines, int(after))}: time", words, accepted)
+        raise refusal(f"{_place(path, lines, int(after))}: time", words, accepted)
     frame = log.frame.iloc[rows].reset_index(drop=True)
     return replace(log, frame=frame, repeated=int(twice.sum()))
 
 
-def _place(lines: Sequence[int] | None, row: int) -> str:
-    return f"row {row + 1}" if lines is None else str(lines[row])
+def _place(path: Path, lines: Sequence[int] | None, row: int) -> str:
+    return f"{path}: row {row + 1}" if lines is None else f"{path}:{lines[row]}"

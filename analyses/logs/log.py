@@ -131,11 +131,11 @@ class Log(Result):
 
     def cables(self) -> list[str]:
         """Names of the cables of which anything was measured, in the order of columns."""
-        endings = [ending for ending, _ in CABLE_QUANTITIES.values()]
-        measured = {name: end for end in endings for name in self.of_cables(end)}
-        return list(dict.fromkeys(
-            name.removesuffix(f"_{measured[name]}") for name in self.frame if name in measured
-        ))  # fmt: skip
+        stems = {
+            name: name.removesuffix(f"_{ending}")
+            for ending, _ in CABLE_QUANTITIES.values() for name in self.of_cables(ending)
+        }  # fmt: skip
+        return list(dict.fromkeys(stems[name] for name in self.frame if name in stems))
 
     def table(self, names: Sequence[str]) -> Array:
         """Some columns beside each other, shape (k, n)."""
@@ -143,14 +143,12 @@ class Log(Result):
 
     def rows_summary(self) -> dict[str, Any]:
         """What is odd about the rows, for JSON."""
+        rest = self.frame.drop(columns=SECONDS, errors="ignore").to_numpy(float)
         summary: dict[str, Any] = {
             "rows": len(self.frame), "duration_s": None, "usual_step_s": None, "gaps": 0,
-            "longest_gap_s": 0.0, "longest_gap_at_s": None,
-            "repeated_rows_left_out": self.repeated, "rows_like_the_one_before": 0,
+            "longest_gap_s": 0.0, "longest_gap_at_s": None, "repeated_rows_left_out": self.repeated,
+            "rows_like_the_one_before": int(same_as_before(rest).sum()) if rest.shape[1] else 0,
         }  # fmt: skip
-        rest = self.frame.drop(columns=SECONDS, errors="ignore").to_numpy(float)
-        if rest.shape[1]:
-            summary["rows_like_the_one_before"] = int(same_as_before(rest).sum())
         time = self.time
         if time is not None and len(time) > 1:
             steps = np.diff(time)
@@ -195,11 +193,9 @@ class Log(Result):
             low, high = -np.inf if start is None else start, np.inf if end is None else end
             frame = frame[(time >= low) & (time <= high)]
             if not len(frame):
-                since = "" if start is None else f" from {start:g} s"
-                until = "" if end is None else f" until {end:g} s"
-                raise refusal(
-                    self.path, f"no rows{since}{until}", f"a part of {time[0]:g} to {time[-1]:g} s"
-                )
+                words = "no rows" if start is None else f"no rows from {start:g} s"
+                words += "" if end is None else f" until {end:g} s"
+                raise refusal(self.path, words, f"a part of {time[0]:g} to {time[-1]:g} s")
         return replace(self, frame=frame.iloc[::every].reset_index(drop=True))
 
     def write(self, path: Path | str) -> None:
@@ -217,17 +213,14 @@ class Log(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """Everything for JSON but the rows."""
-        counts = self.frame.count()
+        numbers = self.frame.agg(["count", "min", "max"])
         return {
             "file": str(self.path), "format": self.dialect, "why": self.why,
             "rows": self.rows_summary(),
             "columns": {
-                name: {
-                    "rows": int(counts[name]),
-                    "least": float(values.min()) if counts[name] else None,
-                    "largest": float(values.max()) if counts[name] else None,
-                }
-                for name, values in self.frame.items()
+                name: {"rows": int(count), "least": least if count else None,
+                       "largest": largest if count else None}
+                for name, (count, least, largest) in numbers.items()
             },
             "units": self.units, "remarks": list(self.remarks), "clocks": self.clocks,
             "ledger": self.ledger.to_dict("records"),

@@ -140,11 +140,10 @@ class Replay(Result):
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        frame = None
+        frame = followed = None
         if self.frame is not None:
             angles = np.degrees(RollPitchYaw(self.frame.rotation()).vector()).tolist()
             frame = {"position_m": self.frame.translation().tolist(), "angles_deg": angles}
-        followed: dict[str, Any] | None = None
         if self.followed is not None:
             rows, apart = self.followed.rows, self.followed_distances()
             followed = {
@@ -154,10 +153,8 @@ class Replay(Result):
             }  # fmt: skip
         numbers: dict[str, Any] = finite({
             "robot": self.robot.name, "log": str(self.log.path), "rows": self.log.rows_summary(),
-            "rows_with_pose": int(np.count_nonzero(np.isfinite(self.poses[:, 4]))),
-            "rows_with_pose_by_lengths": int(
-                np.count_nonzero(np.isfinite(self.poses_by_lengths[:, 4]))
-            ),
+            "rows_with_pose": int(np.isfinite(self.poses[:, 4]).sum()),
+            "rows_with_pose_by_lengths": int(np.isfinite(self.poses_by_lengths[:, 4]).sum()),
             "cables": {cable.name: self._of_cable(k) for k, cable in enumerate(self.robot.cables)},
             "position_by_lengths_rms_m": _rms(self.distances),
             "position_by_lengths_largest_m": _most(self.distances),
@@ -191,12 +188,10 @@ class Replay(Result):
             rows.append(("simulated", f"follows the log's lengths: {words} from what was"))
         if self.frame is not None:
             rows.append(("tracker", "its frame was fitted to the positions by lengths"))
-        for key, label, unit, factor in (
-            ("position_by_lengths_rms_m", "position", "mm", 1e3),
-            ("unbalanced_force_rms_n", "force left", "N", 1.0),
-        ):
-            if numbers[key] is not None:
-                rows.append((label, f"{factor * numbers[key]:.4g} {unit} rms"))
+        if numbers["position_by_lengths_rms_m"] is not None:
+            rows.append(("position", f"{1e3 * numbers['position_by_lengths_rms_m']:.4g} mm rms"))
+        if numbers["unbalanced_force_rms_n"] is not None:
+            rows.append(("force left", f"{numbers['unbalanced_force_rms_n']:.4g} N rms"))
         for name, cable in numbers["cables"].items():
             parts = []
             if cable["length_offset_m"] is not None:
@@ -235,11 +230,10 @@ class Replay(Result):
             "distance from the\nmeasured position [mm]": distances,
             "force left by\ntensions, weight [N]": {"at rest": (self.time, self.forces)},
         }
-        finite_rows = {
-            label: {name: row for name, row in rows.items() if np.isfinite(row[1]).any()}
-            for label, rows in residuals.items()
-        }
-        shown = {label: rows for label, rows in finite_rows.items() if rows}
+        shown = {
+            label: measured for label, rows in residuals.items()
+            if (measured := {n: row for n, row in rows.items() if np.isfinite(row[1]).any()})
+        }  # fmt: skip
         title = f"{self.log.path.name} beside {self.robot.name}"
         figure, all_axes = panels(len(shown), 1, (9.0, 1.2 + 2.2 * max(len(shown), 1)), title)
         with styled():
@@ -258,11 +252,9 @@ class Replay(Result):
 
         columns = {SECONDS: self.time}
         for k, cable in enumerate(self.robot.cables):
-            for name, values in (
-                ("length_m", self.lengths), ("predicted_length_m", self.predicted_lengths),
-                ("tension_n", self.tensions), ("predicted_tension_n", self.predicted_tensions),
-            ):  # fmt: skip
-                columns[f"{cable.name}_{name}"] = values[:, k]
+            for name in ("length", "predicted_length", "tension", "predicted_tension"):
+                unit = "m" if name.endswith("length") else "n"
+                columns[f"{cable.name}_{name}_{unit}"] = getattr(self, f"{name}s")[:, k]
         for prefix, rows in (("", self.poses), ("by_lengths_", self.poses_by_lengths)):
             for k, name in enumerate((*PARTS[QUATERNION], *PARTS[POSITION])):
                 columns[f"{prefix}{name}"] = rows[:, k]
@@ -276,12 +268,9 @@ class Replay(Result):
         rows = np.flatnonzero(np.isfinite(poses).all(axis=1))
         if len(rows) < 2:
             return {}
-        by_lengths = self.poses_by_lengths[rows]
-        shown = {
-            "time": self.time[rows], "X_WP": poses[rows],
-            "tensions": np.nan_to_num(self.tensions[rows]),
-            "X_WP_by_lengths": np.where(np.isfinite(by_lengths), by_lengths, poses[rows]),
-        }  # fmt: skip
+        model = np.where(np.isfinite(self.poses_by_lengths), self.poses_by_lengths, poses)
+        shown = {"time": self.time[rows], "X_WP": poses[rows], "X_WP_by_lengths": model[rows],
+                 "tensions": np.nan_to_num(self.tensions[rows])}  # fmt: skip
         title = (
             f"{self.log.path.name}: the measured run of {self.robot.name}; orange, where the model "
             "has the platform for the measured lengths"
@@ -392,13 +381,12 @@ def compare_log(robot: Robot, log: Log, fit_frame: bool = False) -> Replay:
             f"{robot.cables[0].name}_{LENGTH}"
         )
     frame = _fitted_frame(log, poses, by_lengths, has_place & has_model) if fit_frame else None
-    for row in np.flatnonzero(has_place & (frame is not None)):
-        assert frame is not None
-        turn = poses[row, :4] if has_pose[row] else home[:4]
-        moved = pose_row(frame @ pose_from_row(np.concatenate([turn, poses[row, 4:]])))
-        poses[row, 4:] = moved[4:]
-        if has_pose[row] and not motion.is_point:
-            poses[row, :4] = moved[:4]
+    if frame is not None:
+        for row in np.flatnonzero(has_place):
+            whole = poses[row] if has_pose[row] else np.r_[home[:4], poses[row, 4:]]
+            moved = pose_row(frame @ pose_from_row(whole))
+            first = 0 if has_pose[row] and not motion.is_point else 4
+            poses[row, first:] = moved[first:]
     predicted, held = nothing.copy(), nothing.copy()
     unbalanced = np.full((k, motion.freedom), np.nan)
     com, gravity = robot.center_of_mass(), robot.gravity_vector()
@@ -463,10 +451,10 @@ def _follow(replay: Replay) -> Followed:
         raise refusal(path, words, "at least two, with times")
     whole = np.all(np.isfinite(replay.poses), axis=1, keepdims=True)
     at = np.where(whole, replay.poses, replay.poses_by_lengths)
-    known = rows[np.isfinite(at[rows]).all(axis=1)]
-    if not len(known):
+    starts = rows[np.isfinite(at[rows]).all(axis=1)]
+    if not len(starts):
         raise refusal(path, "no pose to start at", "at least one")
-    rows = rows[rows >= known[0]]
+    rows = rows[rows >= starts[0]]
     time = replay.time[rows] - replay.time[rows[0]]
     block = CompiledCableRobot(robot, rule=StepRule(), command_period=HELD)
     simulator = Simulator(block)
@@ -475,20 +463,19 @@ def _follow(replay: Replay) -> Followed:
         start = robot.joint().nearest(start)
     block.set_at_equilibrium(context, start)
     block.GetInputPort("cable_velocities").FixValue(context, np.zeros(lengths.shape[1]))
+    rates = np.diff(lengths[rows], axis=0) / np.diff(time)[:, None]
     poses, tensions = np.empty((len(rows), 7)), np.empty((len(rows), lengths.shape[1]))
-    for k in range(len(rows)):
-        simulator.AdvanceTo(time[k])
+    for k, t in enumerate(time):
+        simulator.AdvanceTo(t)
         poses[k] = pose_row(block.GetOutputPort("X_WP").Eval(context))
         tensions[k] = block.GetOutputPort("tensions").Eval(context)
-        if k + 1 < len(rows):
-            rate = (lengths[rows[k + 1]] - lengths[rows[k]]) / (time[k + 1] - time[k])
-            block.GetInputPort("cable_velocities").FixValue(context, rate)
+        if k < len(rates):
+            block.GetInputPort("cable_velocities").FixValue(context, rates[k])
     return Followed(rows, poses, tensions)
 
 
 def _mean(values: Array) -> float | None:
-    present = values[np.isfinite(values)]
-    return float(np.mean(present)) if len(present) else None
+    return float(np.mean(values[np.isfinite(values)])) if np.isfinite(values).any() else None
 
 
 def _rms(values: Array) -> float | None:
