@@ -9,10 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.logs.assembly import numbers
+from cdpr_drake.analyses.logs.assembly import numbers, read_cells, read_text
 from cdpr_drake.analyses.logs.columns import PARTS, POSITION, UNITS, read_header, split_unit
 from cdpr_drake.analyses.logs.measurements import poses_of
-from cdpr_drake.analyses.logs.text import read_cells, read_text
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError
 

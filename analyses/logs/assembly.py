@@ -1,13 +1,15 @@
-"""A log from the columns of a file: units, names, axes, times and refusals of all dialects."""
+"""Cells of texts of all recorders, and a log of columns: units, names, axes, times, refusals."""
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -30,13 +32,22 @@ from cdpr_drake.analyses.logs.columns import (
 )
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, same_as_before
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import LogFileError
 from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.input_files import file_size
 
-Cells = Sequence[str] | Array
+MOST_BYTES = 500_000_000
+"""Of a log; a minute of a hundred columns at 1 kHz has a tenth of that."""
+
+SEPARATORS = (";", "\t", ",")
+"""Signs between cells; where none of them is, blanks are."""
+
+
+Values = Sequence[str] | Array
 """A column: words of a text, or numbers."""
 
 NO_NUMBER = {"", "nan", "na", "n/a", "null", "none", "-"}
-"""Cells, in small letters, of what was not measured."""
+"""Values, in small letters, of what was not measured."""
 
 EPOCH = 1e8
 """Larger times are dates: they are counted from the first row [s]."""
@@ -53,8 +64,103 @@ _ENDS = {"header": " by its header", "told": f", {AS_TOLD}", "dates": "",
          "assumed": ", since neither header nor user says another"}  # fmt: skip
 
 
+class Cells(NamedTuple):
+    """Rows of cells, all as long as the first, the line of each, and the mark in numbers."""
+
+    rows: list[list[str]]
+    lines: list[int]
+    decimal: str
+
+
+def plain_text(raw: bytes, errors: str = "strict") -> str | None:
+    """Text with one kind of line ends; None if bytes are no text; errors as of `bytes.decode`."""
+    wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if not wide and b"\0" in raw:
+        return None
+    text = raw.decode("utf-16" if wide else "utf-8-sig", errors)
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, most: int = -1) -> bytes:
+    """Bytes of a file, or its first ones."""
+    try:
+        if file_size(path) > MOST_BYTES:
+            raise refusal(path, f"more than {MOST_BYTES:,} bytes", "fewer")
+        with path.open("rb") as file:
+            return file.read(most)
+    except OSError as problem:
+        raise LogFileError(f"{path}: cannot be read: {problem.strerror}") from problem
+
+
+def read_text(path: Path) -> str:
+    """Text of a file."""
+    try:
+        text = plain_text(read_bytes(path))
+    except UnicodeDecodeError as problem:
+        words = f"byte {problem.start} that is not of {problem.encoding}"
+        raise refusal(path, words, "text in UTF-8") from problem
+    if text is None:
+        raise refusal(path, "bytes that are no text", "text")
+    return text
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Cells of a line; no separator: blanks."""
+    if separator is None:
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+
+
+def separator_of(line: str) -> str | None:
+    """The separator of a line; None: blanks."""
+    return next((sign for sign in SEPARATORS if sign in line), None)
+
+
+def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 0) -> Cells:
+    """Cells of a text without lines that are empty, begin with #, or are the first ones to skip;
+    separator None: by the first row."""
+    numbered = [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), 1)
+        if number > skip and line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise refusal(path, "no rows", "rows of measurements")
+    separator = separator or separator_of(numbered[0][1])
+    lines = [number for number, _ in numbered]
+    try:
+        rows = [line.split() for _, line in numbered]
+        if separator is not None:
+            table = csv.reader([line for _, line in numbered], delimiter=separator)
+            rows = [[cell.strip() for cell in row] for row in table]
+    except csv.Error as problem:
+        raise LogFileError(f"{path}: cannot be read as a table: {problem}") from problem
+    if len(rows) != len(lines):
+        raise refusal(path, "quotes round a line end", "a row a line")
+    width = len(rows[0])
+    for row, number in zip(rows, lines, strict=True):
+        while len(row) > width and not row[-1]:  # a separator at the end of the line
+            row.pop()
+        if len(row) != width:
+            words = f"{width}, as in line {lines[0]}"
+            raise refusal(f"{path}:{number}", f"{len(row)} cells", words)
+    return Cells(rows, lines, _decimal(rows, separator))
+
+
+def _decimal(rows: Sequence[Sequence[str]], separator: str | None) -> str:
+    """A comma if some cells have one, none has a point, and something else separates cells."""
+    if separator == ",":
+        return "."
+    number = r"[+-]?(\d{{1,3}}({0}\d{{3}})+|\d*){1}\d+([eE][+-]?\d+)?"
+    with_comma, with_point = (
+        any(re.fullmatch(pattern, cell) for row in rows[:200] for cell in row)
+        for pattern in (number.format(r"\.", ","), number.format(",", r"\."))
+    )
+    return "," if with_comma and not with_point else "."
+
+
 def assemble(
-    path: Path, columns: Sequence[tuple[str, Cells]], facts: Facts, *, why: str = "",
+    path: Path, columns: Sequence[tuple[str, Values]], facts: Facts, *, why: str = "",
     shown: Sequence[str] | None = None, lines: Sequence[int] | None = None,
     units: dict[str, str] | None = None, remarks: Sequence[str] = (), cables: Sequence[str] = (),
     left_out: Mapping[str, str] | None = None, decimal: str = ".",
@@ -141,7 +247,7 @@ def assemble(
     return _settled(log, lines)
 
 
-def numbers(cells: Cells, decimal: str = ".") -> tuple[Array, int | None]:
+def numbers(cells: Values, decimal: str = ".") -> tuple[Array, int | None]:
     """Numbers of cells, NaN where nothing was measured; and the first row without a number."""
     try:
         values = np.array(cells, float)
@@ -190,7 +296,7 @@ def _rank(row: Mapping[str, str], values: Array) -> int:
 
 
 def _times(
-    cells: Cells, values: Array, bad: int | None, factor: float
+    cells: Values, values: Array, bad: int | None, factor: float
 ) -> tuple[Array, int | None, list[str]]:
     """Times of a column; dates and times since an epoch are counted from the first row."""
     if isinstance(cells, np.ndarray) or not len(cells):
@@ -210,7 +316,7 @@ def _times(
     return values, bad, []
 
 
-def _unit(column: Column, facts: Facts, cells: Cells, fixed: bool) -> tuple[str, str, float]:
+def _unit(column: Column, facts: Facts, cells: Values, fixed: bool) -> tuple[str, str, float]:
     """Unit of a column, who said so, and its factor to SI."""
     dimension = column.dimension
     if dimension in ("", "image"):

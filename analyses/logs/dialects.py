@@ -17,13 +17,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.analyses.logs import machines, matlab, ros
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
-from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
-from cdpr_drake.analyses.logs.log import Facts, Log, refusal
-from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
-from cdpr_drake.analyses.logs.ros import ROS_COLUMNS, Headers, read_bag, renamed
-from cdpr_drake.analyses.logs.text import (
+from cdpr_drake.analyses.logs import machines, ros
+from cdpr_drake.analyses.logs.assembly import (
+    LEFT_OUT,
+    assemble,
+    is_number,
     plain_text,
     read_bytes,
     read_cells,
@@ -31,6 +29,10 @@ from cdpr_drake.analyses.logs.text import (
     separator_of,
     split_line,
 )
+from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
+from cdpr_drake.analyses.logs.log import Facts, Log, refusal
+from cdpr_drake.analyses.logs.motive import knows_motive, read_motive
+from cdpr_drake.analyses.logs.ros import ROS_COLUMNS, Headers, read_bag, renamed
 from cdpr_drake.analyses.reporting.mcap_log import MAGIC
 from cdpr_drake.errors import LogFileError, accepted_names
 
@@ -158,7 +160,8 @@ DIALECTS = {
     ),
     CSV: Dialect("text with columns, with headers or a mapping", knows_columns),
     "mat": Dialect(
-        "GRAB's parsed .mat, or any with a mapping", magic(matlab.MAT), matlab.read_mat, binary=True
+        "GRAB's parsed .mat, or any with a mapping", magic(machines.MAT), machines.read_mat,
+        binary=True,
     ),
     "rosbag": Dialect(
         "bags of ROS 1 and 2: .bag, .db3, .mcap with CDR, or their folder",

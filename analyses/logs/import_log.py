@@ -9,6 +9,7 @@ from typing import Annotated, Any, TypeAlias
 
 import numpy as np
 from cyclopts import Parameter
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -25,10 +26,17 @@ from cdpr_drake.analyses.logs.clocks import join_logs, without_packets
 from cdpr_drake.analyses.logs.columns import COMMANDED, ESTIMATED, UNITS
 from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, read_log
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
-from cdpr_drake.analyses.logs.text import with_mapping
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CdprError, LogFileError, OutputFolderError, accepted_names
+from cdpr_drake.errors import (
+    CdprError,
+    LogFileError,
+    OutputFolderError,
+    accepted_names,
+    why_not_read,
+)
 from cdpr_drake.models.robot_loader import as_robot
+from cdpr_drake.schema.input_files import file_size
+from cdpr_drake.schema.yaml_files import load_yaml
 
 
 def checked_units(units: Mapping[str, str]) -> dict[str, str]:
@@ -103,6 +111,51 @@ def facts_of(
         R_WF=axes_rotation(axes) if isinstance(axes, str) else axes,
     )  # fmt: skip
     return facts if mapping is None else with_mapping(facts, Path(mapping))
+
+
+_MOST_MAPPING = 1_000_000
+"""Bytes of a mapping file."""
+
+
+class _Mapping(BaseModel):
+    """Content of a mapping file; descriptions are what is accepted."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    columns: list[str | None] | dict[str, str | None] = Field(
+        min_length=1,
+        description="a list of headers with their units, as [time_s, C1_length_mm, ''], or name: "
+        "header",
+    )
+    skip_rows: int = Field(0, ge=0, description="a whole number from 0")
+    separator: str | None = Field(None, pattern=r'^[^"\n\r.]$', description="one sign, as ';'")
+    rate_hz: float | None = Field(None, gt=0.0, allow_inf_nan=False, description="a number above 0")
+
+
+def with_mapping(facts: Facts, path: Path) -> Facts:
+    """Facts with what a mapping file says: YAML with columns, skip_rows, separator, rate_hz."""
+    try:
+        if file_size(path) > _MOST_MAPPING:
+            raise refusal(path, f"more than {_MOST_MAPPING:,} bytes", "fewer")
+        content = load_yaml(path.read_text(encoding="utf-8"))
+        mapping = _Mapping.model_validate(content)
+    except ValidationError as problem:
+        key, known = str((*problem.errors()[0]["loc"], "columns")[0]), _Mapping.model_fields
+        if key not in known:
+            raise LogFileError(f"{path}: found {key!r}; {accepted_names(key, known)}") from problem
+        value = content.get(key) if isinstance(content, dict) else content
+        raise refusal(f"{path}: {key}", str(value)[:80], known[key].description) from problem
+    except (OSError, ValueError) as problem:
+        words = " ".join(why_not_read(problem).split())
+        raise LogFileError(f"{path}: cannot be read: {words[:200]}") from problem
+    headers: Any = mapping.columns
+    named = isinstance(headers, dict)
+    return replace(
+        facts, skip_rows=mapping.skip_rows, separator=mapping.separator,
+        mapping={name: header or "" for name, header in headers.items()} if named
+        else [header or "" for header in headers],
+        rate=mapping.rate_hz if facts.rate is None else facts.rate,
+    )  # fmt: skip
 
 
 OPTIONS = """log_format: Reader; auto says which and why.

@@ -1,27 +1,38 @@
-"""Logs of machines whose files are no tables: Hangprinter, Maslow, GRAB, GTGraffiti."""
+"""Logs of machines whose files are no tables: Hangprinter, Maslow, GRAB, GTGraffiti, MATLAB."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, is_number
+from cdpr_drake.analyses.logs.assembly import (
+    LEFT_OUT,
+    Values,
+    assemble,
+    is_number,
+    numbers,
+    read_cells,
+)
 from cdpr_drake.analyses.logs.columns import (
     COMMANDED,
     ESTIMATED,
     LENGTH,
+    PARTS,
+    RPY,
     SECONDS,
     SWIVEL,
     TENSION,
 )
-from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
-from cdpr_drake.analyses.logs.text import read_cells
+from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, unreadable
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import LogFileError
 
 _LOOKED = 20
 """Lines by which a file is recognised."""
@@ -34,7 +45,7 @@ def _top(head: str) -> list[str]:
 # Hangprinter: github.com/tobbelobb/auto-calibration-simulation-for-hangprinter, simulation.py.
 
 _ARRAYS = ("motor_pos_samp", "xyz_of_samp", "force_samp")
-_MOTOR, _FORCE = re.compile(r"motor_([A-Za-z0-9]+)_deg"), re.compile(r"force_([A-Za-z0-9]+)")
+_MOTOR = re.compile(r"motor_([A-Za-z0-9]+)_deg")
 _NO_FORCE_UNIT = (
     "the unit of the forces is not stated: kept as raw_force; cdpr import-log --unit force=N"
 )
@@ -81,24 +92,17 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
         letters = [motor[1] for cell in frame if (motor := _MOTOR.fullmatch(cell))]
     own, columns = list(frame), frame.to_numpy().T.tolist()
     names = facts.names(path, len(letters), letters)
-    name_of = dict(zip(letters, names, strict=True))
-    stated = "force" in facts.units
-    headers, forces = list[str](), 0
-    for cell in own:
-        motor, force = _MOTOR.fullmatch(cell), _FORCE.fullmatch(cell)
-        if motor:
-            headers.append(f"{name_of[motor[1]]}_motor_deg")
-        elif force and force[1] in name_of:
-            forces += 1
-            headers.append(f"{name_of[force[1]]}_tension" if stated else f"raw_{cell}")
-        else:
-            headers.append(cell)
+    stated, headers = "force" in facts.units, {name: name for name in own}
+    for letter, name in zip(letters, names, strict=True):
+        headers[f"motor_{letter}_deg"] = f"{name}_motor_deg"
+        headers[f"force_{letter}"] = f"{name}_tension" if stated else f"raw_force_{letter}"
+    forces = any(f"force_{letter}" in own for letter in letters)
     units = {"motor angles": "deg by the format"}
     units |= {"positions": "mm by the format"} if "x_mm" in own else {}
     units |= {"forces": f"{facts.units['force']}, {AS_TOLD}"} if forces and stated else {}
     return assemble(
-        path, list(zip(headers, columns, strict=True)), facts, shown=own, lines=lines, units=units,
-        cables=names, decimal=decimal,
+        path, [(headers[own[j]], column) for j, column in enumerate(columns)], facts, shown=own,
+        lines=lines, units=units, cables=names, decimal=decimal,
         remarks=[_NO_FORCE_UNIT] if forces and not stated else [],
     )  # fmt: skip
 
@@ -106,32 +110,29 @@ def read_hangprinter(path: Path, text: str, facts: Facts) -> Log:
 def _series(path: Path, text: str, name: str) -> list[list[str]]:
     """Rows of an array of a script; signs may be doubled, --7945.95, as its scripts accept it."""
     plain = re.sub(r"#[^\n]*", "", text)
-    starts = [found.end() for found in re.finditer(
-        rf"^[ \t]*{name}\s*=\s*(?:np\.array\s*\()?\s*(?=\[)", plain, re.MULTILINE
-    )]  # fmt: skip
-    if len(starts) > 1:
-        places = ", ".join(str(plain.count("\n", 0, start) + 1) for start in starts)
-        raise refusal(f"{path}: {name}", f"{len(starts)} times, in lines {places}", "once")
-    if not starts:
+    begins = list(re.finditer(rf"^[ \t]*{name}\s*=\s*(np\.array\s*\()?\s*(?=\[)", plain, re.M))
+    if len(begins) > 1:
+        places = ", ".join(str(plain.count("\n", 0, begin.end()) + 1) for begin in begins)
+        raise refusal(f"{path}: {name}", f"{len(begins)} times, in lines {places}", "once")
+    if not begins:
         return []
-    depths = np.cumsum([{"[": 1, "]": -1}.get(sign, 0) for sign in plain[starts[0] :]])
-    if depths.all():
-        raise refusal(f"{path}: {name}", "brackets that do not close", "[[...], ...]")
-    begin, end = starts[0] + 1, starts[0] + int(np.argmin(depths != 0))
+    begin = begins[0].end()
+    other = r"[^\[\]]*+"
+    table = re.compile(rf"\[({other}\[{other}\])*+{other}\]").match(plain, begin)
+    if table is None or not (table[1] or table[0].strip("[], \n") == ""):
+        place = f"{path}:{plain.count(chr(10), 0, begin) + 1}: {name}"
+        raise refusal(place, "no table with closed brackets", "[[...], ...]")
     rows = []
-    for found in re.finditer(r"\[([^\[\]]*)\]", plain[begin:end]):
-        cells = [cell.strip() for cell in found[1].strip().rstrip(",").split(",")]
+    for row in re.compile(r"\[([^\[\]]+)\]").finditer(plain, begin + 1, table.end() - 1):
+        cells = [cell.strip() for cell in row[1].strip().rstrip(",").split(",")]
         for k, cell in enumerate(cells):
-            signs = re.match(r"[+\-\s]*", cell)[0]  # type: ignore[index]
-            word = ("-" if signs.count("-") % 2 else "") + cell[len(signs) :]
-            if cell.count("-") - signs.count("-") > 1 or not word or not is_number(word):
-                line = plain.count("\n", 0, begin + found.start(1)) + 1
+            signs, word = re.fullmatch(r"([+\-\s]*)(.*)", cell, re.S).groups()  # type: ignore[union-attr]
+            if not word or not is_number(word):
+                line = plain.count("\n", 0, row.start(1)) + 1
                 accepted = "numbers, or nan where nothing was measured"
                 raise refusal(f"{path}:{line}: {name}", repr(cell[:40]), accepted)
-            cells[k] = "" if word.lstrip("-").lower() == "nan" else word
+            cells[k] = "" if word.lower() == "nan" else "-" * (signs.count("-") % 2) + word
         rows.append(cells)
-    if not rows and plain[begin:end].strip():
-        raise refusal(f"{path}: {name}", "no table of numbers", "[[...], ...]")
     return rows
 
 
@@ -219,13 +220,13 @@ _JITTER = 2.5e-3
 def knows_grab(head: str) -> str:
     """Recognises lines type,time,... of actuators and of the inclinometer."""
     lines = [line.split(",") for line in _top(head)]
-    widths = [len(line) for line in lines if line[0] == _ACTUATOR and len(line) in _LAYOUTS]
-    width_of = {_ACTUATOR: (widths or [0])[0], _INCLINOMETER: _TILT_CELLS}
-    known = [line for line in lines if len(line) == width_of.get(line[0])]
-    values = all(is_number(cell) and cell.strip() for line in known for cell in line)
-    if len(lines) < 2 or not widths or not values or len(known) < 0.6 * len(lines):
+    width = next((len(c) for c in lines if c[0] == _ACTUATOR and len(c) in _LAYOUTS), 0)
+    width_of = {_ACTUATOR: width, _INCLINOMETER: _TILT_CELLS}
+    known = [cells for cells in lines if len(cells) == width_of.get(cells[0])]
+    values = all(is_number(cell) and cell.strip() for cells in known for cell in cells)
+    if len(lines) < 2 or not width or not values or len(known) < 0.6 * len(lines):
         return ""
-    words = f"{widths[0]} cells of actuators (3), {_TILT_CELLS} of the inclinometer (5)"
+    words = f"{width} cells of actuators (3), {_TILT_CELLS} of the inclinometer (5)"
     return f"its lines are type,time,... with {words}"
 
 
@@ -236,7 +237,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
     rows: dict[float, dict[tuple[str, int], float]] = {}  # by time
     at_line: list[int] = []
     other = Counter[str]()
-    width = latest = 0
+    width = late = 0
     for number, line in enumerate(text.split("\n"), 1):
         cells = [cell.strip() for cell in line.split(",")]
         if not line.strip():
@@ -248,7 +249,13 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
             continue
         actuator = cells[0] == _ACTUATOR
         width = width or (len(cells) if actuator and len(cells) in _LAYOUTS else 0)
-        values = _line_numbers(path, number, cells, (width or 14) if actuator else _TILT_CELLS)
+        cell_count = (width or 14) if actuator else _TILT_CELLS
+        if len(cells) != cell_count:
+            raise refusal(f"{path}:{number}", f"{len(cells)} cells of type {cells[0]}", cell_count)
+        for j, cell in enumerate(cells):
+            if not is_number(cell, finite=True):
+                raise refusal(f"{path}:{number}: cell {j + 1}", f"{cell[:30]!r}", "a finite number")
+        values = [float(cell) for cell in cells]
         key = int(values[2])
         if actuator and not (key == values[2] and 0 <= key < _MOST_ACTUATORS):
             raise refusal(f"{path}:{number}: actuator", cells[2], "a whole number from 0")
@@ -257,7 +264,7 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
             before = next(reversed(rows))
             if 0.0 < time - before < _JITTER and (LENGTH, key) not in rows[before]:
                 time = before
-                latest += 1
+                late += 1
         if time not in rows:
             rows[time] = {}
             at_line.append(number)
@@ -269,25 +276,22 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
             rows[time] |= {(_INCLINOMETER, k): values[2 + k] for k in range(3)}
     keys = sorted({key for row in rows.values() for what, key in row if what == LENGTH})
     names = facts.names(path, len(keys))
-
-    def column(what: str, key: int) -> Array:
-        return np.array([row.get((what, key), np.nan) for row in rows.values()])
-
-    columns = [(SECONDS, np.array(list(rows)))]
-    for what in _LAYOUTS[width or 14]:
-        header = f"{COMMANDED}{{}}_{TENSION}" if what == COMMANDED else f"{{}}_{what}"
-        for name, key in zip(names, keys, strict=True):
-            columns.append((header.format(name), column(what, key)))
+    headers = {
+        (what, key): f"{COMMANDED}{name}_{TENSION}" if what == COMMANDED else f"{name}_{what}"
+        for what in _LAYOUTS[width or 14] for name, key in zip(names, keys, strict=True)
+    }  # fmt: skip
     if any((_INCLINOMETER, 0) in row for row in rows.values()):
-        angles = ("roll_deg", "pitch_deg", "yaw_deg")
-        columns += [(angle, column(_INCLINOMETER, k)) for k, angle in enumerate(angles)]
+        headers |= {(_INCLINOMETER, k): f"{a}_deg" for k, a in enumerate(("roll", "pitch", "yaw"))}
+    columns = [(SECONDS, np.array(list(rows)))]
+    columns += [(header, np.array([row.get(key, np.nan) for row in rows.values()]))
+                for key, header in headers.items()]  # fmt: skip
     remarks = ["lengths and swivel angles count from where the encoders were switched on"]
     if other:
-        told = ", ".join(f"{count} of type {kind}" for kind, count in sorted(other.items()))
-        remarks.append(f"lines of other devices were left out: {told}")
-    if latest:
-        late = f"{latest} lines that came up to {1e3 * _JITTER:g} ms"
-        remarks.append(f"{late} after the first one of their row stand in that row")
+        counts = ", ".join(f"{count} of type {kind}" for kind, count in sorted(other.items()))
+        remarks.append(f"lines of other devices were left out: {counts}")
+    if late:
+        remarks.append(f"{late} lines that came up to {1e3 * _JITTER:g} ms after the first one of "
+                       "their row stand in that row")  # fmt: skip
     unused = [name for name in _UNUSED if width in (0, 14) or name != "length rate"]
     units = {
         "lengths, swivels, tensions": "m, rad, N by the format",
@@ -298,15 +302,6 @@ def read_grab(path: Path, text: str, facts: Facts) -> Log:
         path, columns, facts, lines=at_line, units=units, cables=names, remarks=remarks,
         left_out=dict.fromkeys(unused + [f"type {kind}" for kind in sorted(other)], LEFT_OUT),
     )  # fmt: skip
-
-
-def _line_numbers(path: Path, number: int, cells: list[str], width: int) -> list[float]:
-    if len(cells) != width:
-        raise refusal(f"{path}:{number}", f"{len(cells)} cells of type {cells[0]}", width)
-    for j, cell in enumerate(cells):
-        if not is_number(cell, finite=True):
-            raise refusal(f"{path}:{number}: cell {j + 1}", f"{cell[:30]!r}", "a finite number")
-    return [float(cell) for cell in cells]
 
 
 # GTGraffiti: github.com/gchenfc/cable-robot, Firmware/gerry06_mcu_only.
@@ -364,5 +359,107 @@ def _graffiti_cells(line: str) -> list[float] | None:
     if start is None or len(parts) < 4 or any(len(part.split()) != 4 for part in parts[1:-1]):
         return None
     cells = [*start.groups(), *(cell for part in parts[1:-1] for cell in part.split())]
-    known = all(is_number(cell, finite=True) for cell in cells)
-    return [float(cell) for cell in cells] if known else None
+    values, bad = numbers(cells)
+    return values.tolist() if bad is None and np.isfinite(values).all() else None
+
+
+# Files of MATLAB: GRAB's parsed logs, and any with a mapping.
+
+MAT = b"MATLAB 5.0 MAT-file"
+
+GRAB_VARIABLES = {
+    "t": SECONDS, "epsilon": ",".join(PARTS[RPY]), "epsilon_r": "roll_deg,pitch_deg,yaw_deg",
+    "cable_length": f"{{c}}_{LENGTH}", "swivel": f"{{c}}_{SWIVEL}", "tensions": f"{{c}}_{TENSION}",
+    "target_tensions": f"{COMMANDED}{{c}}_{TENSION}",
+}  # fmt: skip
+"""Headers of the variables of GRAB's tools; with _r behind they are at 1 kHz, epsilon in degrees.
+
+Source: github.com/fzoffoli/UACDPR_SelfCalibration, CdprViconDataHandling/CdprDataHandling.m and
+CdprViconDataHandling.m, which makes radians of epsilon_r."""
+
+
+def read_mat(path: Path, _: str, facts: Facts) -> Log:
+    """Reads a log of GRAB's tools, or the variables that a mapping names, as
+    `st.tensions: "{c}_tension_n"` with {c} for the names of cables.
+    """
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+    except Exception as problem:  # scipy raises of all kinds on damaged files
+        raise unreadable(path, "a file of MATLAB", problem) from problem
+    variables = dict(_flat("", {k: v for k, v in content.items() if not k.startswith("__")}))
+    fields = {name.split(".")[1] for name in variables if "." in name}
+    if fields >= {"EndEffector", "Trasmission"}:  # as their files spell them
+        raise refusal(path, "a robot of GRAB's tools", "logs; see cdpr import")
+    wanted = _wanted(path, variables, facts)
+    tables = {name: _table(path, name, variables[name]) for name in wanted}
+    count = max(len(table) for table in tables.values())
+    columns: dict[str, Values] = {}
+    for name, headers in wanted.items():
+        table, width = tables[name], tables[name].shape[1]
+        if len(table) != count:
+            raise refusal(f"{path}: {name}", f"{len(table)} rows", f"{count}, as the others have")
+        if len(headers) == 1 and "{c}" in headers[0]:
+            headers = [headers[0].replace("{c}", cable) for cable in facts.names(path, width)]
+        if len(headers) != width:
+            words = f"{len(headers)}: {', '.join(headers)}"
+            raise refusal(f"{path}: {name}", f"{width} columns", words)
+        for header, column in zip(headers, table.T, strict=True):
+            if header in columns:
+                raise refusal(f"{path}: {name}", f"{header} twice", "once")
+            columns[header] = column
+    columns = dict(sorted(columns.items(), key=lambda item: item[0] != SECONDS))
+    rest = [name for name in variables if name not in wanted]
+    by = "m, rad, N, s by the format"
+    by += "; epsilon_r in deg" if any("roll_deg" in headers for headers in wanted.values()) else ""
+    return assemble(
+        path, list(columns.items()), facts,
+        units={"variables": by if facts.mapping is None else "by the mapping"},
+        remarks=[f"variables left out: {', '.join(rest)}"] if rest else [],
+        left_out=dict.fromkeys(rest, LEFT_OUT),
+    )  # fmt: skip
+
+
+def _flat(prefix: str, content: dict[str, Any], depth: int = 0) -> Iterator[tuple[str, Any]]:
+    """Variables by name, those of structures by structure.name."""
+    for name, value in content.items():
+        names = getattr(value, "_fieldnames", None)
+        if names is not None and depth < 8:
+            inner = {key: getattr(value, key) for key in names}
+            yield from _flat(f"{prefix}{name}.", inner, depth + 1)
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _wanted(path: Path, variables: dict[str, Any], facts: Facts) -> dict[str, list[str]]:
+    """Headers of the variables that are read."""
+    mapping = facts.mapping
+    if mapping is not None and not isinstance(mapping, dict):
+        raise refusal(f"{path}: mapping: columns", "a list", "variable: header")
+    if mapping is None:
+        last = {name: name.rpartition(".")[2] for name in variables}
+        known = {n: GRAB_VARIABLES.get(w, GRAB_VARIABLES.get(w.removesuffix("_r"), ""))
+                 for n, w in last.items()}  # fmt: skip
+        mapping = known if len(list(filter(None, known.values()))) > 1 else {}
+    missing = [name for name in mapping if name not in variables]
+    wanted = {name: headers for name, headers in mapping.items() if headers}
+    if missing or not wanted:
+        place = f"{path}: mapping: columns" if missing else path
+        words = f"{missing[0]!r}; variables are" if missing else "the variables"
+        accepted = f"{', '.join(GRAB_VARIABLES)}, or a mapping that says what they are"
+        raise refusal(place, f"{words} {', '.join(variables)[:120] or 'none'}", accepted)
+    return {n: [word.strip() for word in headers.split(",")] for n, headers in wanted.items()}
+
+
+def _table(path: Path, name: str, value: Any) -> Array:
+    """A variable with a row an instant, shape (k, n): MATLAB's have a row a cable here."""
+    try:
+        table = np.atleast_1d(np.asarray(value, float))
+    except (TypeError, ValueError) as problem:
+        raise LogFileError(f"{path}: {name}: found what are no numbers") from problem
+    if table.ndim == 1:
+        return table[:, None]
+    if table.ndim != 2:
+        raise refusal(f"{path}: {name}", f"shape {table.shape}", "rows and columns")
+    return table.T if table.shape[0] < table.shape[1] else table

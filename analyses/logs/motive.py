@@ -14,10 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, assemble, numbers, refuse_other_lengths
+from cdpr_drake.analyses.logs.assembly import (
+    LEFT_OUT,
+    Cells,
+    assemble,
+    numbers,
+    read_cells,
+    refuse_other_lengths,
+)
 from cdpr_drake.analyses.logs.columns import PARTS, QUATERNION, SECONDS
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
-from cdpr_drake.analyses.logs.text import Cells, read_cells
 from cdpr_drake.errors import LogFileError, accepted_names
 
 FIRST, BODY, MARKER = "Format Version", "Rigid Body", "Marker"

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.assembly import LEFT_OUT, WORDS, Cells, assemble
+from cdpr_drake.analyses.logs.assembly import LEFT_OUT, WORDS, Values, assemble
 from cdpr_drake.analyses.logs.clocks import interpolate_poses
 from cdpr_drake.analyses.logs.columns import (
     CABLE_QUANTITIES,
@@ -124,7 +124,7 @@ def _joined(
     first = max(chosen, key=weight)
     start, scale = (int(chosen[first].clock()[0]), 1e-9) if bag else (0, 1.0)
     at = scale * (chosen[first].clock() - start)
-    columns: list[tuple[str, Cells]] = [(SECONDS, at)]
+    columns: list[tuple[str, Values]] = [(SECONDS, at)]
     shown, left_out = [first if bag else SECONDS], dict[str, str]()
     remarks = [f"times count from the first message of {first}, {start} ns"] if bag else []
     for name, topic in chosen.items():

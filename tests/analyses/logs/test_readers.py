@@ -6,10 +6,9 @@ from scipy.io import savemat
 
 from cdpr_drake.analyses.logs.clocks import join_logs
 from cdpr_drake.analyses.logs.dialects import DIALECTS, Dialect, first_line, read_log, recognise
-from cdpr_drake.analyses.logs.import_log import axes_rotation, import_log
+from cdpr_drake.analyses.logs.import_log import axes_rotation, import_log, with_mapping
 from cdpr_drake.analyses.logs.log import Facts
 from cdpr_drake.analyses.logs.measurements import read_measurements
-from cdpr_drake.analyses.logs.text import with_mapping
 from cdpr_drake.errors import CdprError, LogFileError
 from tests.analyses.logs import recorders
 from tests.figure_faults import figure_faults
