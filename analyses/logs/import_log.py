@@ -140,7 +140,8 @@ def with_mapping(facts: Facts, path: Path) -> Facts:
         content = load_yaml(path.read_text(encoding="utf-8"))
         mapping = _Mapping.model_validate(content)
     except ValidationError as problem:
-        key, known = str((*problem.errors()[0]["loc"], "columns")[0]), _Mapping.model_fields
+        errors = sorted(problem.errors(), key=lambda error: error["type"] != "extra_forbidden")
+        key, known = str((*errors[0]["loc"], "columns")[0]), _Mapping.model_fields
         if key not in known:
             raise LogFileError(f"{path}: found {key!r}; {accepted_names(key, known)}") from problem
         value = content.get(key) if isinstance(content, dict) else content

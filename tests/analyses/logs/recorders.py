@@ -40,16 +40,11 @@ def motive(count=1500, rate=120.0, units=None, bodies=("Sled",)):
     p_M = np.column_stack([-p[:, 1], p[:, 2], -p[:, 0]])
     settings = f"Format Version,1.1,Take Name,take,Rotation Type,Quaternion,Length Units,{units}"
     settings = settings if units else settings.partition(",Length")[0]
-    kinds, names, parts, axes = [], [], [], []
-    for name in bodies:
-        kinds += ["Rigid Body"] * 8
-        names += [name] * 8
-        parts += ["Rotation"] * 4 + ["Position"] * 3 + ["Error Per Marker"]
-        axes += [*"XYZW", *"XYZ", ""]
-    kinds += ["Marker"] * 3
-    names += ["Corner 1"] * 3
-    parts += ["Position"] * 3
-    axes += [*"XYZ"]
+    n = len(bodies)
+    kinds = ["Rigid Body"] * 8 * n + ["Marker"] * 3
+    names = [name for name in bodies for _ in range(8)] + ["Corner 1"] * 3
+    body = ["Rotation"] * 4 + ["Position"] * 3 + ["Error Per Marker"]
+    parts, axes = body * n + ["Position"] * 3, [*"XYZW", *"XYZ", ""] * n + [*"XYZ"]
     factor = {"Millimeters": 1e3, None: 1.0}.get(units, 1.0)
     lines = [settings, ""]
     lines += [",," + ",".join(row) for row in (kinds, names, ["id"] * len(kinds), parts)]
@@ -66,15 +61,13 @@ def grab(count=60):
     lines = []
     for k in range(count):
         t = 10.0 + 0.1 * k + (5.0 if k > 30 else 0.0)
-        for i in range(4):
-            length, tension = 0.1 * i + 0.001 * k, 50.0 + i + 0.1 * k
-            lines.append(
-                f"3,{t:.3f},{i},9,{1000 * k},5,0,{length:.6f},0.0,{tension:.3f},55,"
-                f"{k},0,{0.01 * k:.5f}"
-            )
+        lines += [
+            f"3,{t:.3f},{i},9,{1000 * k},5,0,{0.1 * i + 0.001 * k:.6f},0.0,{50.0 + i + 0.1 * k:.3f}"
+            f",55,{k},0,{0.01 * k:.5f}"
+            for i in range(4)
+        ]
         lines.append(f"5,{t:.3f},{0.1 * k:.4f},1.5,-0.2")
-        if k % 7 == 0:
-            lines.append(f"6,{t:.3f},0,0,0")
+        lines += [f"6,{t:.3f},0,0,0"] * (k % 7 == 0)
     return "\n".join(lines) + "\n"
 
 
@@ -98,12 +91,10 @@ def hangprinter_script():
 
 def hangprinter_columns():
     """The same as CSV."""
-    header = "motor_A_deg,motor_B_deg,motor_C_deg,motor_D_deg,x_mm,y_mm,z_mm"
-    rows = []
-    for k, motors in enumerate(MOTOR_ANGLES.tolist()):
-        points = POINTS[k].tolist() if k < len(POINTS) else ["", "", ""]
-        rows.append(",".join(str(cell) for cell in [*motors, *points]))
-    return "\n".join([header, *rows]) + "\n"
+    points = [*POINTS.tolist(), ["", "", ""]]
+    rows = [[*motors, *place] for motors, place in zip(MOTOR_ANGLES.tolist(), points, strict=True)]
+    header = [*(f"motor_{letter}_deg" for letter in "ABCD"), "x_mm", "y_mm", "z_mm"]
+    return "\n".join(",".join(map(str, row)) for row in [header, *rows]) + "\n"
 
 
 def columns(separator=",", decimal=".", ending="\n"):
@@ -131,10 +122,9 @@ def maslow(count=8):
 
 def ros(count=6):
     """What rostopic echo -p writes of a tracker, times in ns."""
-    header = "%time,field.header.seq,field.header.stamp,field.header.frame_id"
-    header += ",field.pose.position.x,field.pose.position.y,field.pose.position.z"
-    header += ",field.pose.orientation.x,field.pose.orientation.y,field.pose.orientation.z"
-    header += ",field.pose.orientation.w"
+    header = "%time,field.header.seq,field.header.stamp,field.header.frame_id,"
+    header += ",".join(f"field.pose.position.{axis}" for axis in "xyz") + ","
+    header += ",".join(f"field.pose.orientation.{axis}" for axis in "xyzw")
     start = 1732800000000000000
     rows = [
         f"{start + 10_000_000 * k + 300},{k},{start + 10_000_000 * k},world,{0.1 * k:g},1,2,0,0,0,1"
@@ -155,44 +145,65 @@ def grab_older(cells, count=40):
     return "\n".join(lines) + "\n"
 
 
-def rosbag(folder, plugin, count=50):
-    """A bag of ROS 2 with a tracker at 50 Hz and two winches at 100 Hz, 5 ms apart."""
-    from rosbags.rosbag2 import Writer
+def rosbag(path, kind, count=50):
+    """A bag with a tracker at 50 Hz and two winches at 100 Hz, 5 ms apart; of ROS 1, or of ROS 2 as
+    MCAP or SQLITE3. The tracker's quaternion has another sign in every other message."""
+    from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    kind = store.types
-    make, start = {name.rpartition("/")[2]: kind[name] for name in kind}, 1_732_800_000 * 10**9
+    first = kind == "ros1"
+    store = get_typestore(Stores.ROS1_NOETIC if first else Stores.ROS2_HUMBLE)
+    start, make = 1_732_800_000, dict(store.types)
+    make |= {name.rpartition("/")[2]: kind for name, kind in store.types.items()}
+    writer = rosbag1.Writer(path) if first else rosbag2.Writer(
+        path, version=9, storage_plugin=rosbag2.StoragePlugin[kind]
+    )  # fmt: skip
+    serialize = store.serialize_ros1 if first else store.serialize_cdr
 
     def header(ns):
-        stamp = make["Time"](sec=ns // 10**9, nanosec=ns % 10**9)
-        return make["Header"](stamp=stamp, frame_id="world")
+        stamp = make["builtin_interfaces/msg/Time"](sec=start + ns // 10**9, nanosec=ns % 10**9)
+        return make["Header"](stamp=stamp, frame_id="world", **{"seq": 0} if first else {})
 
-    with Writer(folder, version=9, storage_plugin=plugin) as writer:
+    with writer:
         topics = {
-            name: (writer.add_connection(name, type_name, typestore=store), type_name)
-            for name, type_name in (
+            name: (writer.add_connection(name, message, typestore=store), message)
+            for name, message in (
                 ("/tracker/pose", "geometry_msgs/msg/PoseStamped"),
                 ("/winches", "sensor_msgs/msg/JointState"), ("/note", "std_msgs/msg/String"),
             )
         }  # fmt: skip
 
         def write(topic, ns, message):
-            connection, type_name = topics[topic]
-            writer.write(connection, ns + 300, store.serialize_cdr(message, type_name))
+            connection, name = topics[topic]
+            writer.write(connection, start * 10**9 + ns + 300, serialize(message, name))
 
-        write("/note", start, make["String"](data="started"))
+        write("/note", 0, make["String"](data="started"))
         for k in range(2 * count):
-            ns = start + 10_000_000 * k
-            angles = np.array([0.1 * k, -0.2 * k])
-            names = ["winch_left", "winch_right"]
+            ns, angles = 10_000_000 * k, np.array([0.1 * k, -0.2 * k])
             write("/winches", ns, make["JointState"](
-                header=header(ns), name=names, position=angles, velocity=0.0 * angles,
-                effort=1.0 + angles,
+                header=header(ns), name=["winch_left", "winch_right"], position=angles,
+                velocity=0.0 * angles, effort=1.0 + angles,
             ))  # fmt: skip
             if k % 2 == 0:
                 ns += 5_000_000
-                turn = make["Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+                sign = 1.0 if k % 4 == 0 else -1.0
+                turn = make["Quaternion"](x=0.6 * sign, y=0.0, z=0.0, w=0.8 * sign)
                 place = make["Point"](x=0.01 * (k + 0.5), y=1.0, z=2.0)
                 pose = make["Pose"](position=place, orientation=turn)
                 write("/tracker/pose", ns, make["PoseStamped"](header=header(ns), pose=pose))
+
+
+def run_files(folder, count=40):
+    """log.npz and log.csv in a folder, as a run leaves them; the quantities by name."""
+    random = np.random.default_rng(3)
+    q = random.normal(size=(count, 4))
+    X_WP = np.hstack([q / np.linalg.norm(q, axis=1, keepdims=True), random.normal(size=(count, 3))])
+    log = {"time": np.arange(count) * 0.01, "X_WP": X_WP,
+           "tensions": random.uniform(1, 90, (count, 2)),
+           "error": random.normal(size=count)}  # fmt: skip
+    np.savez(folder / "log.npz", **log)
+    names = ["time", *(f"X_WP.{a}" for a in ("qw", "qx", "qy", "qz", "x", "y", "z"))]
+    names += ["tensions.C1", "tensions.C2", "error"]
+    rows = [",".join(map(repr, row)) for row in np.column_stack(list(log.values())).tolist()]
+    (folder / "log.csv").write_text("\n".join([",".join(names), *rows]) + "\n")
+    return log

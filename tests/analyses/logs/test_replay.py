@@ -10,6 +10,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
+from tests.analyses.logs import recorders
 
 OFFSETS = np.array([0.02, -0.01, 0.0, 0.005])
 """Errors of lengths in the log [m]."""
@@ -89,3 +90,14 @@ def test_a_log_with_nothing_to_compare_is_refused(tmp_path):
     path.write_text("time_s,C1_length_m\n0,1\n1,1\n")
     with pytest.raises(CdprError, match="accepted for gt_graffiti: poses, or lengths"):
         replay_log(path, robot="gt_graffiti")
+
+
+def test_a_topic_of_a_bag_is_replayed(tmp_path):
+    """Topics that are not named are another matter, and what a log does not use is said."""
+    recorders.rosbag(tmp_path / "run", "SQLITE3")
+    robot = load_robot("acrobot_small")
+    told = {"robot": robot, "topic": ["/tracker/pose"], "rate": 5.0}
+    replay = replay_log(tmp_path / "run", **told)
+    assert replay.as_dict()["rows_with_pose"] == len(replay.poses) == 50
+    assert any("not used: a rate of 5" in remark for remark in replay.remarks)
+    assert dict(replay.log.ledger[["header", "fate"]].to_numpy())["/winches"] == "another topic"
