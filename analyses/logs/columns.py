@@ -123,7 +123,7 @@ def read_header(header: str, cables: Sequence[str], first: int = 1) -> Column | 
         cables: Names of the cables.
         first: Number of the first cable where numbers stand for names, 0 or 1.
     """
-    prefix = next((p for p in (COMMANDED, ESTIMATED) if header.lower().startswith(p)), "")
+    prefix = _prefix(header)
     words, unit = split_unit(header[len(prefix) :])
     marker = re.fullmatch(r"marker_(\w+)_([xyz])", words)
     if marker:
@@ -159,17 +159,20 @@ def _quantity(words: str, plain: str, cables: Sequence[str], first: int) -> tupl
     return None
 
 
+def _prefix(header: str) -> str:
+    return next((p for p in (COMMANDED, ESTIMATED) if header.lower().startswith(p)), "")
+
+
 def cable_names(headers: Sequence[str]) -> list[str]:
     """Names of cables in headers such as tl_length_mm or motor_A_deg: at most two letters and a
     number; none where there is one name only."""
     names: dict[str, None] = {}
     for header in headers:
-        prefix = next((p for p in (COMMANDED, ESTIMATED) if header.lower().startswith(p)), "")
-        match = _NAMED.fullmatch(split_unit(header[len(prefix) :])[0])
+        bare = header[len(_prefix(header)) :]
+        match = _NAMED.fullmatch(split_unit(bare)[0])
         group = "b" if match and match["b"] else "a"
         if match and match[group] not in _NO_NAMES:
-            begin, end = match.span(group)
-            names[header[len(prefix) :][begin:end]] = None
+            names[bare[match.start(group) : match.end(group)]] = None
     return list(names) if len(names) > 1 else []
 
 

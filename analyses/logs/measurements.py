@@ -15,21 +15,16 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cdpr_drake.analyses.logs.assembly import LEFT_OUT, READ, refuse_other_lengths
 from cdpr_drake.analyses.logs.columns import (
-    ANGLES,
     CABLE_QUANTITIES,
     COMMANDED,
     ESTIMATED,
-    LENGTHS,
     MARKERS,
     PARTS,
     POSITION,
     QUATERNION,
     ROTATIONS,
     RPY,
-    SWIVELS,
     TAIT,
-    TENSIONS,
-    TORQUES,
     TURN,
 )
 from cdpr_drake.analyses.logs.dialects import AUTO, read_log
@@ -146,11 +141,9 @@ class Measurements:
         """
         time = self.time
         if time is not None and self.points is not None:
-            present = np.isfinite(self.points).all(axis=1)
-            columns = self.points[present].T
-            moved = [
-                np.interp(time + late, time[present], column, np.nan, np.nan) for column in columns
-            ]
+            rows = np.isfinite(self.points).all(axis=1)
+            moved = [np.interp(time + late, time[rows], column, np.nan, np.nan)
+                     for column in self.points[rows].T]  # fmt: skip
             return replace(self, points=np.column_stack(moved))
         if time is None or self.poses is None:
             missing = "time" if time is None else "poses"
@@ -224,9 +217,7 @@ def read_measurements(
 
 
 def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
-    """Binds a log to a robot with these cables, whose names its own get.
-
-    Cables that the log names otherwise are bound by their order, if there are as many.
+    """Binds a log to a robot with these cables; by their order if the log names as many otherwise.
 
     Raises:
         LogFileError: No cable is one of the robot's, or the log has parts of a pose or of a tag's
@@ -234,37 +225,31 @@ def bind_log(log: Log, cables: Sequence[str]) -> Measurements:
     """
     frame, lost, words = _robot_columns(log, cables)
     path, count = log.path, len(frame)
-    tables: dict[str, Array | None] = {}
-    for kind, (ending, _) in CABLE_QUANTITIES.items():
-        names = [f"{cable}_{ending}" for cable in cables]
-        tables[kind] = _table(frame, names) if set(names) & set(frame) else None
+    names = [[f"{cable}_{ending}" for cable in cables] for ending, _ in CABLE_QUANTITIES.values()]
+    lengths, angles, swivels, torques, tensions = (
+        _table(frame, columns) if set(columns) & set(frame) else None for columns in names
+    )
     kinds = [kind for kind in ROTATIONS if set(PARTS[kind]) & set(frame)]
-    placed = bool(set(PARTS[POSITION]) & set(frame))
-    poses = tilts = points = None
-    if placed and kinds:
-        poses = poses_of(path, frame)
-    elif kinds and RPY in kinds:
+    points = _table(frame, PARTS[POSITION]) if set(PARTS[POSITION]) & set(frame) else None
+    poses = tilts = None
+    if points is not None and kinds:
+        poses, points = poses_of(path, frame), None
+    elif RPY in kinds:
         tilts = _table(frame, PARTS[RPY])
     elif kinds:
-        rotations = _rotations(path, kinds[0], frame)
-        none = np.full(3, np.nan)
+        rotations, none = _rotations(path, kinds[0], frame), np.full(3, np.nan)
         tilts = np.array([none if R is None else RollPitchYaw(R).vector() for R in rotations])
-    elif placed:
-        points = _table(frame, PARTS[POSITION])
     ledger = log.ledger
     used = (ledger["fate"] == READ) & ~ledger["kind"].isin(_NOT_FITTED) & ~ledger["name"].isin(lost)
     unread = ledger["header"][~used & (ledger["fate"] != LEFT_OUT)].tolist()
     remarks = [f"columns not read: {', '.join(unread)}"] if unread else []
     remarks += [f"{log.repeated} repeated rows left out"] if log.repeated else []
     remarks += [remark for remark in log.remarks if not re.match(_SAID_OTHERWISE, remark)]
-    headers: dict[str, tuple[str, ...]] = {}
-    for kind, header in zip(ledger["kind"][used], ledger["header"][used], strict=True):
-        headers[kind] = (*headers.get(kind, ()), header)
+    headers = ledger[used].groupby("kind", sort=False)["header"].agg(tuple).to_dict()
     return Measurements(
-        path, count, log.time, lengths=tables[LENGTHS], angles=tables[ANGLES],
-        swivels=tables[SWIVELS], tensions=tables[TENSIONS], torques=tables[TORQUES], poses=poses,
-        corners=_corners(path, frame), tilts=tilts, points=points, headers=headers,
-        remarks=(*remarks, *words),
+        path, count, log.time, lengths=lengths, angles=angles, swivels=swivels, torques=torques,
+        tensions=tensions, poses=poses, corners=_corners(path, frame), tilts=tilts, points=points,
+        headers=headers, remarks=(*remarks, *words),
     )  # fmt: skip
 
 

@@ -109,9 +109,7 @@ def _joined(
         accepted = f"some of {', '.join(topics)[:200] or 'a bag with messages'}"
         raise refusal(f"{path}: topic", (missing or ["no numbers"])[0], accepted)
     headers = {
-        name: {
-            key: renamed(_header(name, key), ROS_COLUMNS) if bag else key for key in topic.fields()
-        }
+        name: {key: _header(name, key) if bag else key for key in topic.fields()}
         for name, topic in chosen.items()
     }
 
@@ -188,9 +186,9 @@ def _fields(value: Any, key: str) -> Iterator[tuple[str, float | str]]:
 
 def _header(topic: str, key: str) -> str:
     """Header of a field; the data of std_msgs bear the topic's name."""
-    if key == "data" or key.startswith("data["):
-        return topic.strip("/").replace("/", "_") + key.removeprefix("data").strip("[]")
-    return key
+    if re.fullmatch(r"data(\[.*)?", key):
+        key = topic.strip("/").replace("/", "_") + key.removeprefix("data").strip("[]")
+    return renamed(key, ROS_COLUMNS)
 
 
 def read_mcap(path: Path, _: str, facts: Facts) -> Log:
