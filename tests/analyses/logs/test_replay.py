@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.logs.replay import replay_log
+from cdpr_drake.cables.elastic_law import unstrained_lengths
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
@@ -23,27 +24,33 @@ SMALL = 2e-3
 below a millimetre each, and its swing at 60 Hz [m]."""
 
 
-def written(tmp_path, offsets, shift=(0.0, 0.0, 0.0), tensions=False):
-    """A slow motion of gt_graffiti; the tracker's origin may be another one."""
-    robot = load_robot("gt_graffiti")
+def written(tmp_path, offsets, shift=(0.0, 0.0, 0.0), tension=None):
+    """A slow motion of gt_graffiti; the tracker's origin may be another one. With a tension, the
+    lengths are without stretch."""
+    cables = load_robot("gt_graffiti").cable_set()
     t = np.arange(0.0, 3.0, 0.02)
     p = np.column_stack([1.5 + 0.2 * np.sin(t) ** 2, 0.0 * t, 1.1 + 0.1 * np.sin(1.7 * t) ** 2])
-    lengths = np.array(
-        [cable_paths(pose_from_angles(x, np.zeros(3)), robot.cable_set()).lengths for x in p]
-    )
-    table = np.column_stack([t, lengths + offsets, p - np.array(shift)])
-    header = "time_s," + ",".join(f"C{k}_length_m" for k in (1, 2, 3, 4)) + ",x_m,y_m,z_m"
-    path = tmp_path / "log.csv"
+    lengths = np.array([cable_paths(pose_from_angles(x, np.zeros(3)), cables).lengths for x in p])
+    header, rest = [f"C{k}_length_m" for k in (1, 2, 3, 4)], []
+    if tension is not None:
+        lengths = unstrained_lengths(lengths, np.full(4, tension), cables.stiffness)
+        rest, header = (
+            [np.full((len(t), 4), tension)],
+            [*header, *(f"C{k}_tension_n" for k in "1234")],
+        )
+    table = np.column_stack([t, lengths + offsets, *rest, p - np.array(shift)])
+    path, header = tmp_path / "log.csv", ",".join(["time_s", *header, "x_m", "y_m", "z_m"])
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.9f")
     return path
 
 
-def test_residuals_by_cable_are_the_errors_of_lengths(tmp_path):
-    found = replay_log(written(tmp_path, OFFSETS), robot="gt_graffiti")
-    told = found.as_dict()["cables"]
-    offsets = [told[f"C{k}"]["length_offset_m"] for k in (1, 2, 3, 4)]
+@pytest.mark.parametrize("tension", [None, 60.0])
+def test_residuals_by_cable_are_the_errors_of_lengths(tension, tmp_path):
+    replay = replay_log(written(tmp_path, OFFSETS, tension=tension), robot="gt_graffiti")
+    cables = replay.as_dict()["cables"]
+    offsets = [cables[f"C{k}"]["length_offset_m"] for k in (1, 2, 3, 4)]
     np.testing.assert_allclose(offsets, OFFSETS, atol=1e-8)
-    assert all(told[name]["length_residual_rms_m"] < 1e-8 for name in told)
+    assert all(cables[name]["length_residual_rms_m"] < 1e-8 for name in cables)
 
 
 def test_a_model_that_is_right_has_the_measured_poses(tmp_path):

@@ -1,5 +1,7 @@
 """Texts as recorders write them: a table of what is read of them, and a table of refusals."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,9 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from tests.analyses.logs import recorders
 
 CABLES, TOLD, NAN = ("C1", "C2"), Facts(units={"length": "m"}, rate=100.0), np.nan
+
+READ_NS = 1e-9
+"""Times of ROS are whole nanoseconds [s]."""
 
 HEADERS = (
     "C1_length_m,C2_length_m", "l1,l2", "L_1 [m], L_2 [m]", "cable1_length,cable2_length",
@@ -65,6 +70,49 @@ READ = [
      {"bl_length_m": [0.52912], "br_length_m": [0.53325], "tr_length_m": [0.53314],
       "tl_length_m": [0.53513]}, ""),
 ]  # fmt: skip
+
+
+TURNS = np.radians(recorders.MOTOR_ANGLES).T
+SERIES = dict(zip((f"{letter}_motor_angle_rad" for letter in "ABCD"), TURNS, strict=True))
+SERIES |= {"x_m": [-5e-4, -0.2661, NAN], "y_m": [-6e-4, -0.2844, NAN], "z_m": [0, 5e-4, NAN]}
+SCRIPT = recorders.hangprinter_script()
+FORCES = {f"raw_force_{letter}": [force, NAN, NAN]
+          for letter, force in zip("ABCD", (13.7, 14.5, 14.1, 12.5), strict=True)}  # fmt: skip
+PULLED = {name.replace("raw_force_", "") + "_tension_n": row for name, row in FORCES.items()}
+ALONG, GONE = recorders.gtgraffiti(40), [NAN] * 39
+
+TOLD_SO = [
+    (SCRIPT, Facts(), SERIES | FORCES, "unit of the forces is not stated: kept as raw_force"),
+    (SCRIPT, Facts(units={"force": "n"}), SERIES | PULLED, "forces': 'n, as told"),
+    (SCRIPT.replace("[-4834.5", "[--4834.5").replace("-1079.4", "- 1079.4"), Facts(),
+     {"A_motor_angle_rad": np.abs(TURNS[0]), "C_motor_angle_rad": TURNS[2]}, "deg by the format"),
+    (recorders.hangprinter_columns(), Facts(), SERIES, "mm by the format"),
+    (recorders.maslow(), Facts(),
+     {f"{belt}_length_m": 1e-3 * (first + step * np.arange(8)) for belt, first, step in
+      (("bl", 2300.5, 7), ("br", 923.4, 11), ("tr", 1733.87, -5), ("tl", 2801.87, -3))}, "belts"),
+    # Times of the sender; of the recorder where the sender's are 0, without a clock.
+    (recorders.ros(), Facts(), {"time_s": 0.01 * np.arange(6), "x_m": 0.1 * np.arange(6)},
+     "%time worse"),
+    (re.sub(r",\d+,\d{19},world", ",0,0,w", recorders.ros()), Facts(),
+     {"time_s": 0.01 * np.arange(6)}, "field.header.frame_id left out"),
+    ("time,C1_length\n0,1000\n1,1001\n", Facts(), {"C1_length_m": [1000, 1001]},
+     "since neither header nor user says another"),
+    ("time,C1_length\n0,1000\n1,1001\n", Facts(units={"length": "mm"}),
+     {"C1_length_m": [1, 1.001]}, "mm, as told"),
+    (ALONG.replace("- 0.0000 0.0000", "- 1.5000 0.0000", 1), TOLD,
+     {"commanded_x_m": [1.5, *GONE], "commanded_z_m": [0.0, *GONE]}, "0, 0 is none"),
+    (ALONG.replace("- 0.0000 0.0000", "- 1,500.0 0.0000", 1), TOLD,
+     {"commanded_x_m": [1500.0, *GONE]}, "last line, 42, is cut off"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "facts", "columns", "words"), TOLD_SO)
+def test_a_text_has_these_columns_and_words_among_others(text, facts, columns, words, write):
+    log = read_log(write("log.txt", text), facts)
+    for name, values in columns.items():
+        np.testing.assert_allclose(log.frame[name], values, rtol=1e-12, atol=READ_NS)
+    fates = [f"{row.header} {row.fate}" for row in log.ledger.itertuples()]
+    assert words in f"{log.units} {log.remarks} {fates}"
 
 
 @pytest.mark.parametrize(("text", "columns", "words"), READ)
