@@ -19,7 +19,6 @@ from typing import Any
 
 from cdpr_drake.analyses.logs import machines, ros
 from cdpr_drake.analyses.logs.assembly import (
-    LEFT_OUT,
     assemble,
     is_number,
     plain_text,
@@ -126,15 +125,13 @@ def columns_log(path: Path, text: str, facts: Facts, patterns: Headers = ()) -> 
         words = f"{width} columns of numbers without a header"
         lengths = f"{m} lengths, or {m} lengths and {m} swivel angles, " if m else ""
         raise refusal(path, words, f"{lengths}a header, or a mapping with a list of columns")
-    read = [j for j, header in enumerate(headers) if header]
+    shown = rows[0] if headed else [f"column {j + 1}" for j in range(width)]
+    if mapping is not None or not headed:
+        shown = [header or name for header, name in zip(headers, shown, strict=True)]
+    columns = [(header, [row[j] for row in rows[headed:]]) for j, header in enumerate(headers)]
     return assemble(
-        path, [(headers[j], [row[j] for row in rows[headed:]]) for j in read], facts, why=why,
-        shown=[rows[0][j] for j in read] if headed and mapping is None else None,
-        lines=cells.lines[headed:], remarks=remarks, decimal=cells.decimal,
-        left_out={
-            rows[0][j] if headed else f"column {j + 1}": LEFT_OUT
-            for j, header in enumerate(headers) if not header
-        },
+        path, columns, facts, why=why, shown=shown, lines=cells.lines[headed:],
+        decimal=cells.decimal, remarks=remarks,
     )  # fmt: skip
 
 
