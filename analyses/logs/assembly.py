@@ -104,18 +104,6 @@ def read_text(path: Path) -> str:
     return text
 
 
-def split_line(line: str, separator: str | None) -> list[str]:
-    """Cells of a line; no separator: blanks."""
-    if separator is None:
-        return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
-
-
-def separator_of(line: str) -> str | None:
-    """The separator of a line; None: blanks."""
-    return next((sign for sign in SEPARATORS if sign in line), None)
-
-
 def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 0) -> Cells:
     """Cells of a text without lines that are empty, begin with #, or are the first ones to skip;
     separator None: by the first row."""
@@ -126,7 +114,7 @@ def read_cells(path: Path, text: str, separator: str | None = None, skip: int = 
     ]
     if not numbered:
         raise refusal(path, "no rows", "rows of measurements")
-    separator = separator or separator_of(numbered[0][1])
+    separator = separator or next((sign for sign in SEPARATORS if sign in numbered[0][1]), None)
     lines = [number for number, _ in numbered]
     try:
         rows = [line.split() for _, line in numbered]

@@ -25,8 +25,6 @@ from cdpr_drake.analyses.logs.assembly import (
     read_bytes,
     read_cells,
     read_text,
-    separator_of,
-    split_line,
 )
 from cdpr_drake.analyses.logs.columns import MOST_CABLES, cable_names, read_header
 from cdpr_drake.analyses.logs.log import Facts, Log, refusal
@@ -80,15 +78,16 @@ def magic(raw: bytes, words: str = "") -> Callable[[bytes], str]:
 def knows_columns(head: str) -> str:
     """Recognises text whose first row has known headers and whose second row has numbers."""
     lines = [line for line in head.split("\n") if line.strip() and not line.startswith("#")][:2]
+    try:
+        cells = read_cells(Path(), "\n".join(lines))
+    except LogFileError:  # its reader says where quotes do not close
+        return "its first row has quotes" if '"' in "".join(lines[:1]) else ""
     if len(lines) < 2 or not re.search(r"[A-Za-z_]", lines[0]):
         return ""
-    separator = separator_of(lines[0])
-    cells, below = (split_line(line, separator) for line in lines)
-    comma = separator not in (",", None)
-    values = [is_number(cell, "," if comma and "," in cell else ".") for cell in below]
-    names = ["C" + str(k + 1) for k in range(MOST_CABLES)] + cable_names(cells)
-    known = [cell for cell in cells if read_header(cell, names) is not None]
-    if not known or len(below) != len(cells) or sum(values) < 0.5 * len(values):
+    headers, below = cells.rows
+    names = [f"C{k + 1}" for k in range(MOST_CABLES)] + cable_names(headers)
+    known = [cell for cell in headers if read_header(cell, names) is not None]
+    if not known or sum(is_number(cell, cells.decimal) for cell in below) < 0.5 * len(below):
         return ""
     return f"its first row has the headers {', '.join(known[:3])}"
 

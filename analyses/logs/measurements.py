@@ -52,17 +52,14 @@ class Measurements:
     """What was measured of a robot, by rows.
 
     Attributes:
-        path: The file.
-        count: Rows k.
+        path, count: The file, and its rows k.
         time: Shape (k,) [s]; None without times.
-        lengths: Of m cables, shape (k, m) [m], NaN where not measured; None without any.
-        angles: Motor angles, shape (k, m) [rad]; None.
-        swivels: Shape (k, m) [rad]; None.
-        tensions: Shape (k, m) [N]; None.
+        lengths, angles, swivels, tensions, torques: Of the m cables, angles and torques of their
+            motors, which are positive if they pay out, shape (k, m) [m, rad, rad, N, N m], NaN
+            where not measured; None without any.
         poses: X_WP of a tracker, None in rows without; None.
         corners: Images of a tag's corners by its number, shape (k, 4, 2) [px].
         remarks: What was left out, in words.
-        torques: Of the motors, positive pays out, shape (k, m) [N m]; None.
         tilts: Roll, pitch and yaw of an inclinometer or IMU, without positions beside them, shape
             (k, 3) [rad], NaN where not measured; None.
         headers: Headers of the file by kind of quantity: `LENGTHS` and the like.

@@ -147,7 +147,7 @@ def grab_older(cells, count=40):
 
 def rosbag(path, kind, count=50):
     """A bag with a tracker at 50 Hz and two winches at 100 Hz, 5 ms apart; of ROS 1, or of ROS 2 as
-    MCAP or SQLITE3. The tracker's quaternion has another sign in every other message."""
+    MCAP or SQLITE3. The tracker turns by 2 rad/s about x; of every other message by -q."""
     from rosbags import rosbag1, rosbag2
     from rosbags.typesys import Stores, get_typestore
 
@@ -187,7 +187,8 @@ def rosbag(path, kind, count=50):
             if k % 2 == 0:
                 ns += 5_000_000
                 sign = 1.0 if k % 4 == 0 else -1.0
-                turn = make["Quaternion"](x=0.6 * sign, y=0.0, z=0.0, w=0.8 * sign)
+                x, w = sign * np.sin(0.01 * (k + 0.5)), sign * np.cos(0.01 * (k + 0.5))
+                turn = make["Quaternion"](x=x, y=0.0, z=0.0, w=w)
                 place = make["Point"](x=0.01 * (k + 0.5), y=1.0, z=2.0)
                 pose = make["Pose"](position=place, orientation=turn)
                 write("/tracker/pose", ns, make["PoseStamped"](header=header(ns), pose=pose))
