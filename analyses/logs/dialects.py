@@ -50,6 +50,7 @@ class Dialect:
             damaged or missing; None: text with columns, see `columns`.
         columns: Patterns of whole headers, and the headers with units that they stand for, with
             {} for the first group; an empty one leaves columns out.
+        above: Number of lines above the headers.
         binary: True if files are no text; `read` then gets an empty text.
     """
 
@@ -57,6 +58,7 @@ class Dialect:
     knows: Callable[[Any], str]
     read: Callable[[Path, str, Facts], Log] | None = None
     columns: Headers = ()
+    above: int = 0
     binary: bool = False
 
 
@@ -92,9 +94,9 @@ def knows_columns(head: str) -> str:
     return f"its first row has the headers {', '.join(known[:3])}"
 
 
-def columns_log(path: Path, text: str, facts: Facts, patterns: Headers = ()) -> Log:
+def columns_log(path: Path, text: str, facts: Facts, patterns: Headers = (), above: int = 0) -> Log:
     """Text with columns, by its headers, the patterns of its dialect, or a mapping."""
-    cells = read_cells(path, text, facts.separator, facts.skip_rows)
+    cells = read_cells(path, text, facts.separator, facts.skip_rows or above)
     rows, mapping, remarks = cells.rows, facts.mapping, list[str]()
     width, m = len(rows[0]), len(facts.cables or facts.robot_cables)
     headed = not all(is_number(cell, cells.decimal) for cell in rows[0])
@@ -205,7 +207,7 @@ def read_log(path: Path | str, facts: Facts | None = None, dialect: str = AUTO) 
     if dialect not in (AUTO, CSV) and not why:
         start = "other bytes" if how.binary else f"{text[:30]!r} at the top"
         raise refusal(path, start, how.title)
-    read = how.read or partial(columns_log, patterns=how.columns)
+    read = how.read or partial(columns_log, patterns=how.columns, above=how.above)
     log = read(path, text, facts)
     return replace(log, dialect=log.dialect or name, why=log.why or why or "it has headers")
 
