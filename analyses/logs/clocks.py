@@ -30,22 +30,20 @@ from cdpr_drake.analyses.logs.log import Log, refusal
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.clock_alignment import align_clocks, interpolate_rows
 
-TOGETHER = 0.25
-"""Readings nearer to each other than this share of their mean step came in one packet."""
-
-PACKED = 0.25
-"""So large a share of the steps is within packets; else readings came one by one."""
+TOGETHER, PACKED = 0.25, 0.25
+"""Steps below this share of the mean are within a packet; so large a share of all steps is, or
+readings came one by one."""
 
 FEWEST, PACKETS = 30, 5
 """Readings and packets, fewer do not show a clock."""
 
 USUAL, PAUSED = 95.0, 4.0
-"""Percentile of the steps, which packets of up to twenty reach, and steps longer by this factor
-are pauses of the recorder: they do not count for the mean step."""
+"""Percentile of the steps, which packets of up to twenty reach; steps longer by this factor are
+pauses of the recorder and do not count for the mean step."""
 
 LATEST = 1.5
-"""A reading that is off the clock by more than so many packets: the clock did not run evenly, or
-readings were lost, and nothing is changed."""
+"""Packets by which a reading may be off the clock; else the clock was not even, or readings were
+lost, and nothing is changed."""
 
 
 def without_packets(log: Log) -> Log:

@@ -98,16 +98,14 @@ def _unit(path: Path, settings: dict[str, str], facts: Facts) -> tuple[str, str]
     """Unit of lengths, and who said so."""
     named, told = settings.get("Length Units", ""), facts.units.get("length")
     known = _UNITS.get(named.lower())
-    if known is None and told is None:
-        raise LogFileError(
-            f"{path}: Length Units: found {named or 'none'}; {accepted_names(named, _UNITS)}, or "
-            "use unit length=m, mm or cm"
-        )
-    if known is not None and told not in (None, known):
+    if known and told not in (None, known):
         raise refusal(f"{path}: Length Units", f"{named}, and {told} with unit", "one of them")
-    if known is not None:
+    if known:
         return known, f"{named.lower()} by the file's Length Units"
-    return str(told), f"{told}, {AS_TOLD}"
+    if told:
+        return told, f"{told}, {AS_TOLD}"
+    accepted = f"{accepted_names(named, _UNITS)}, or use unit length=m, mm or cm"
+    raise LogFileError(f"{path}: Length Units: found {named or 'none'}; {accepted}")
 
 
 def _groups(path: Path, types: list[str], names: list[str], parts: list[str]) -> Groups:
@@ -147,10 +145,10 @@ def _platform(path: Path, groups: Groups, cells: Cells, facts: Facts) -> str:
 
 
 def _remarks(groups: Groups, body: str) -> list[str]:
-    remarks = [
-        f"the platform is the rigid body {body!r}" if body else "no rigid body: markers only"
-    ]
+    remarks = [f"the platform is the rigid body {body!r}"] if body else [
+        "no rigid body: markers only"
+    ]  # fmt: skip
     parts = sum(1 for kind, _ in groups if kind == "Rigid Body Marker")
-    others = [name for kind, name in groups if kind == BODY and name != body]
+    others = ", ".join(name for kind, name in groups if kind == BODY and name != body)
     remarks += [f"{parts} markers that make up rigid bodies were left out"] if parts else []
-    return remarks + ([f"other rigid bodies were left out: {', '.join(others)}"] if others else [])
+    return remarks + ([f"other rigid bodies were left out: {others}"] if others else [])

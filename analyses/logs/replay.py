@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -92,8 +91,8 @@ class Replay(Result):
     Attributes:
         robot, log: The robot and the log.
         time: Shape (k,) [s], or numbers of rows where there are no times.
-        poses: Measured X_WP, shape (k, 7), see `pose_row`; NaN for turns that were not measured.
-        poses_by_lengths: The model's, for the measured lengths, shape (k, 7).
+        poses, poses_by_lengths: X_WP as measured, and the model's for the measured lengths, shape
+            (k, 7), see `pose_row`; NaN for turns that were not measured.
         lengths, tensions: Measured, lengths also by motor angles, shape (k, m) [m, N].
         predicted_lengths: The model's at the measured poses, shape (k, m) [m].
         predicted_tensions: Those that carry the weight, shape (k, m) [N]; NaN with more cables
@@ -122,17 +121,17 @@ class Replay(Result):
     folder: Path | None = None
     failed: dict[str, str] = field(default_factory=dict)
 
-    @cached_property
+    @property
     def length_residuals(self) -> Array:
         """Measured minus predicted, shape (k, m) [m]."""
         return self.lengths - self.predicted_lengths
 
-    @cached_property
+    @property
     def distances(self) -> Array:
         """Between measured positions and those by lengths, shape (k,) [m]."""
         return np.asarray(np.linalg.norm(self.poses[:, 4:] - self.poses_by_lengths[:, 4:], axis=1))
 
-    @cached_property
+    @property
     def forces(self) -> Array:
         """What tensions and weight leave, shape (k,) [N]."""
         moments = self.robot.motion_type().num_turns
