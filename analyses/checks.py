@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.frame.result import Listing
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.logs.dialects import recognise
+from cdpr_drake.analyses.logs.dialects import LOG_SUFFIXES, recognise
 from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.analyses.logs.log import Log
 from cdpr_drake.errors import CdprError, meant_names
@@ -36,9 +36,6 @@ if TYPE_CHECKING:
 
 WRONG = 2
 """Exit code if something is wrong with a file."""
-
-LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".py")
-"""Endings of files that may be logs; a reader has to know what is in them, too."""
 
 
 @dataclass(frozen=True, repr=False)

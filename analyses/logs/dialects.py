@@ -35,6 +35,9 @@ from cdpr_drake.errors import LogFileError, accepted_names
 
 AUTO, CSV = "auto", "csv"
 
+LOG_SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".mcap", ".bag", ".db3", ".py")
+"""Endings of files that may be logs; a reader has to know what is in them, too."""
+
 HEAD = 60_000
 """Bytes at the top of a file by which it is recognised."""
 

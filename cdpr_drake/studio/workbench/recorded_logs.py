@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analyses.logs.columns import LENGTH, PARTS, POSITION, SECONDS, TENSION
+from cdpr_drake.analyses.logs.dialects import LOG_SUFFIXES
 from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.analyses.logs.log import Log, unit_of
 from cdpr_drake.analyses.logs.replay import SUMMARY, TABLE
@@ -28,9 +29,6 @@ from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 LOG_RESULTS = "logs"
 """Folder of comparisons in the working folder."""
 
-SUFFIXES = (".csv", ".tsv", ".txt", ".log", ".dat", ".mat", ".mcap", ".py")
-"""Endings of files that may be logs; a reader has to know what is in them, too."""
-
 MOST_ROWS = 1500
 """Rows of a comparison that are drawn, evenly spread."""
 
@@ -40,7 +38,7 @@ DOTS = 110
 
 def log_files(folder: WorkingFolder) -> list[str]:
     """Files of a working folder that may be logs, those of its runs too."""
-    found = [name for name in folder.files(SUFFIXES) if not name.startswith(f"{LOG_RESULTS}/")]
+    found = [name for name in folder.files(LOG_SUFFIXES) if not name.startswith(f"{LOG_RESULTS}/")]
     runs = sorted(folder.root.glob("runs/*/log.csv"))
     return [*found, *(folder.shown(path) for path in runs)][:MOST_FILES]
 

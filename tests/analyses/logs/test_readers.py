@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from cdpr_drake.analyses.checks import is_log
 from cdpr_drake.analyses.logs.clocks import join_logs
 from cdpr_drake.analyses.logs.dialects import DIALECTS, Dialect, first_line, read_log, recognise
 from cdpr_drake.analyses.logs.import_log import axes_rotation, import_log, with_mapping
@@ -178,6 +179,7 @@ def test_a_bag_is_read_at_the_times_of_what_measures_cables(kind, tmp_path, monk
     assert np.isnan(log.frame["x_m"][0])
     assert any("joints of /winches: 0 is winch_left" in remark for remark in log.remarks)
     assert fates(log)["/note/data"] == "words"
+    assert is_log(file)  # as cdpr check and the studio have it
     alone = import_log(path, topic=["/tracker/pose"])
     assert len(alone.frame) == 50
     assert fates(alone)["/winches"] == "another topic"

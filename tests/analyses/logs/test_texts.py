@@ -81,7 +81,7 @@ FORCES = {f"raw_force_{letter}": [force, NAN, NAN]
 PULLED = {name.replace("raw_force_", "") + "_tension_n": row for name, row in FORCES.items()}
 ALONG, GONE = recorders.gtgraffiti(40), [NAN] * 39
 
-TOLD_SO = [
+PARTLY = [
     (SCRIPT, Facts(), SERIES | FORCES, "unit of the forces is not stated: kept as raw_force"),
     (SCRIPT, Facts(units={"force": "n"}), SERIES | PULLED, "forces': 'n, as told"),
     (SCRIPT.replace("[-4834.5", "[--4834.5").replace("-1079.4", "- 1079.4"), Facts(),
@@ -106,7 +106,7 @@ TOLD_SO = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "facts", "columns", "words"), TOLD_SO)
+@pytest.mark.parametrize(("text", "facts", "columns", "words"), PARTLY)
 def test_a_text_has_these_columns_and_words_among_others(text, facts, columns, words, write):
     log = read_log(write("log.txt", text), facts)
     for name, values in columns.items():
