@@ -175,7 +175,8 @@ def rosbag(path, kind, count=50):
 
         def write(topic, ns, message):
             connection, name = topics[topic]
-            writer.write(connection, start * 10**9 + ns + 300, serialize(message, name))
+            came = start * 10**9 + ns + 300 + ns // 10**6  # by the recorder's clock
+            writer.write(connection, came, serialize(message, name))
 
         write("/note", 0, make["String"](data="started"))
         for k in range(2 * count):
