@@ -108,3 +108,20 @@ def test_a_topic_of_a_bag_is_replayed(tmp_path):
     assert replay.as_dict()["rows_with_pose"] == len(replay.poses) == 50
     assert any("not used: a rate of 5" in remark for remark in replay.remarks)
     assert dict(replay.log.ledger[["header", "fate"]].to_numpy())["/winches"] == "another topic"
+
+
+def test_tensions_that_carry_the_weight_are_predicted_where_the_weight_determines_them(tmp_path):
+    robot = load_robot("nist_robocrane")
+    x, y, z = robot.home.position
+    qw, qx, qy, qz = robot.home.transform().rotation().ToQuaternion().wxyz()
+    names = ",".join(f"{cable.name}_tension_n" for cable in robot.cables)
+    path = tmp_path / "log.csv"
+    path.write_text(
+        f"x_m,y_m,z_m,qw,qx,qy,qz,{names}\n{x},{y},{z},{qw},{qx},{qy},{qz},{'0,' * 5}0\n"
+    )
+    replay = replay_log(path, robot=robot)
+    up = replay.unbalanced[0, 3:] @ robot.gravity_vector()  # without tensions all of the weight
+    assert up == pytest.approx(
+        robot.platform.mass * robot.gravity_vector() @ robot.gravity_vector()
+    )
+    assert np.all(replay.predicted_tensions > 0.0)
