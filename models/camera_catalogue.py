@@ -4,39 +4,41 @@ Files of your own, as `cdpr calibrate-camera` writes them, have the same fields,
 calibrated; `camera_info` files of ROS and files of OpenCV's FileStorage are read too.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_calibrations import read_calibration
 from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
-from cdpr_drake.schema.fields import array, number, optional_section, text, whole
+from cdpr_drake.schema.settings import In, OneOf, Text, settings, values
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, FARTHEST, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
 
-@dataclass(kw_only=True)
+@settings
 class Distortion:
     """What a lens does to the image of a pinhole, in the model and with the signs of OpenCV."""
 
-    kind: str = text(
-        "none; brown_conrady, radial with k1 to k6, k4 to k6 in a denominator, and tangential with "
-        "p1 and p2; fisheye, a polynomial of the angle from the axis with k1 to k4.",
-        NO_LENS,
-        choices=(NO_LENS, *COEFFICIENTS),
-    )
-    k1: float = number("First radial coefficient.", "-", 0.0)
-    k2: float = number("Second radial coefficient.", "-", 0.0)
-    p1: float = number("First tangential coefficient.", "-", 0.0)
-    p2: float = number("Second tangential coefficient.", "-", 0.0)
-    k3: float = number("Third radial coefficient.", "-", 0.0)
-    k4: float = number("Fourth radial coefficient.", "-", 0.0)
-    k5: float = number("Fifth radial coefficient.", "-", 0.0)
-    k6: float = number("Sixth radial coefficient.", "-", 0.0)
+    kind: Annotated[
+        str,
+        OneOf((NO_LENS, *COEFFICIENTS)),
+        "none; brown_conrady, radial with k1 to k6, k4 to k6 in a denominator, and "
+        "tangential with p1 and p2; fisheye, a polynomial of the angle from the axis with"
+        " k1 to k4.",
+    ] = NO_LENS
+    k1: Annotated[float, In("-"), "First radial coefficient."] = 0.0
+    k2: Annotated[float, In("-"), "Second radial coefficient."] = 0.0
+    p1: Annotated[float, In("-"), "First tangential coefficient."] = 0.0
+    p2: Annotated[float, In("-"), "Second tangential coefficient."] = 0.0
+    k3: Annotated[float, In("-"), "Third radial coefficient."] = 0.0
+    k4: Annotated[float, In("-"), "Fourth radial coefficient."] = 0.0
+    k5: Annotated[float, In("-"), "Fifth radial coefficient."] = 0.0
+    k6: Annotated[float, In("-"), "Sixth radial coefficient."] = 0.0
 
     def lens(self) -> LensDistortion | None:
         """The lens; None where it does nothing."""
@@ -79,33 +81,33 @@ def fold_problem(pinhole: Pinhole) -> str:
     )
 
 
-@dataclass(kw_only=True)
+@settings
 class Camera:
     """A camera with its lens."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type of camera and lens.")
-    source: str = text("Where the values stand.")
-    width: int = whole("Width of the full image.", unit="px", at_least=16)
-    height: int = whole("Height of the full image.", unit="px", at_least=16)
-    view_angle_horizontal_deg: float = number(
-        "Full view angle along the width.", "deg", above=0.0, below=180.0
-    )
-    view_angle_vertical_deg: float = number(
-        "Full view angle along the height.", "deg", above=0.0, below=180.0
-    )
-    rate_hz: float = number("Largest frame rate.", "Hz", above=0.0)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
-    principal_point: np.ndarray | None = array(
-        "Principal point (u, v) in the full image, from the middle of its upper left pixel; null: "
-        "the middle of the image.",
-        "px",
-        (2,),
-        None,
-    )
-    distortion: Distortion | None = optional_section(
-        "What the lens does to the image of the pinhole that the view angles mean; null: nothing."
-    )
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type of camera and lens."]
+    source: Annotated[Text, "Where the values stand."]
+    width: Annotated[int, In("px", ge=16), "Width of the full image."]
+    height: Annotated[int, In("px", ge=16), "Height of the full image."]
+    view_angle_horizontal_deg: Annotated[
+        float, In("deg", gt=0.0, lt=180.0), "Full view angle along the width."
+    ]
+    view_angle_vertical_deg: Annotated[
+        float, In("deg", gt=0.0, lt=180.0), "Full view angle along the height."
+    ]
+    rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest frame rate."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    principal_point: Annotated[
+        np.ndarray | None,
+        In("px", 2),
+        "Principal point (u, v) in the full image, from the middle of its upper left "
+        "pixel; null: the middle of the image.",
+    ] = None
+    distortion: Annotated[
+        Distortion | None,
+        "What the lens does to the image of the pinhole that the view angles mean; null: nothing.",
+    ] = None
 
     def pinhole(self, width: int, height: int) -> Pinhole:
         """The pinhole camera with these view angles and an image of width x height [px].
@@ -145,31 +147,30 @@ class Camera:
 DEAD, FROZEN, OFF = "dead", "frozen", "off"
 
 
-@dataclass(kw_only=True)
+@settings
 class CameraFault:
     """A span of time in which a projected camera fails."""
 
-    kind: str = text(
-        "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last image "
-        "again and again; off: takes for the target what is beside it, or was itself knocked.",
-        DEAD,
-        choices=(DEAD, FROZEN, OFF),
-    )
-    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
-    duration: float = number("How long it lasts.", "s", above=0.0)
-    offset: np.ndarray = array(
+    kind: Annotated[
+        str,
+        OneOf((DEAD, FROZEN, OFF)),
+        "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last"
+        " image again and again; off: takes for the target what is beside it, or was "
+        "itself knocked.",
+    ] = DEAD
+    start: Annotated[float, In("s", ge=0.0), "When it begins."] = 0.0
+    duration: Annotated[float, In("s", gt=0.0), "How long it lasts."]
+    offset: Annotated[
+        np.ndarray,
+        In("m", 3),
         "What is taken for the target, from its origin in the camera frame; kind off only.",
-        "m",
-        (3,),
-        (0.03, 0.0, 0.0),
-    )
-    angles_deg: np.ndarray = array(
-        "Angles of R = Rx Ry Rz by which the camera's frame is turned from the one it is believed "
-        "to have, as of a camera that was knocked; kind off only.",
-        "deg",
-        (3,),
-        (0.0, 0.0, 0.0),
-    )
+    ] = values(0.03, 0.0, 0.0)
+    angles_deg: Annotated[
+        np.ndarray,
+        In("deg", 3),
+        "Angles of R = Rx Ry Rz by which the camera's frame is turned from the one it is "
+        "believed to have, as of a camera that was knocked; kind off only.",
+    ] = values(0.0, 0.0, 0.0)
 
     def holds(self, time: float) -> bool:
         """Whether it fails at a time [s]."""

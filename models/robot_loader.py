@@ -14,7 +14,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.cables.cable_behaviour import behaving_cables
@@ -42,7 +41,7 @@ from cdpr_drake.schema.input_files import (
     inputs_held,
     made_of_input,
 )
-from cdpr_drake.schema.typed_yaml import closest, load_typed, parse_typed
+from cdpr_drake.schema.typed_yaml import closest, dump_typed, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
 
@@ -130,7 +129,7 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
         return content
     robot = parse_robot(content, path)
     _put_on_rails(robot, rails, path)
-    return yaml_dump_typed(robot)
+    return dump_typed(robot)
 
 
 def _foreign_content(path: Path) -> str:
@@ -216,7 +215,7 @@ def robot_reference(robot: Robot | str | Path, asks: str = "load_robot") -> Iter
         return
     with TemporaryDirectory() as folder:
         path = Path(folder) / "robot.yaml"
-        path.write_text(yaml_dump_typed(robot), encoding="utf-8")
+        path.write_text(dump_typed(robot), encoding="utf-8")
         input_bytes(path)  # what other processes are sent
         yield str(path)
 

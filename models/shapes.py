@@ -2,14 +2,11 @@
 
 `PlatformShape`, `FrameBeam` and `Frame` are schemas of a robot file. `check_shapes` holds what a
 file says of shapes against the platform's box and the file's folder.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -17,8 +14,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
-from cdpr_drake.schema.fields import array, number, sections, switch, text
 from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
+from cdpr_drake.schema.settings import In, OneOf, Switch, Text, filled, settings, values
 
 if TYPE_CHECKING:  # slow to import, and most robots are boxes
     from pydrake.geometry import Shape
@@ -32,29 +29,28 @@ MESH_SUFFIXES = (".obj", ".gltf")
 _NEEDS = {BOX: "size", SPHERE: "radius", CYLINDER: "radius", MESH: "file"}
 
 
-@dataclass(kw_only=True)
+@settings
 class PlatformShape:
     """The platform's shape within its box, with which pulleys and clearances reckon."""
 
-    kind: str = text("What it is.", choices=(BOX, SPHERE, CYLINDER, MESH))
-    size: np.ndarray | None = array("Edges of a box.", "m", (3,), None, above=0.0)
-    radius: float | None = number("Of a sphere or cylinder.", "m", None, above=0.0)
-    height: float | None = number("Of a cylinder, along its z axis.", "m", None, above=0.0)
-    file: str | None = text(
-        "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its triangles must "
-        "enclose a volume where the inertia follows from it.",
-        None,
-    )
-    scale: float = number("Scale of a mesh, to metres.", "-", 1.0, above=0.0)
-    position: np.ndarray | None = array(
+    kind: Annotated[str, OneOf((BOX, SPHERE, CYLINDER, MESH)), "What it is."]
+    size: Annotated[np.ndarray | None, In("m", 3, gt=0.0), "Edges of a box."] = None
+    radius: Annotated[float | None, In("m", gt=0.0), "Of a sphere or cylinder."] = None
+    height: Annotated[float | None, In("m", gt=0.0), "Of a cylinder, along its z axis."] = None
+    file: Annotated[
+        Text | None,
+        "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its "
+        "triangles must enclose a volume where the inertia follows from it.",
+    ] = None
+    scale: Annotated[float, In("-", gt=0.0), "Scale of a mesh, to metres."] = 1.0
+    position: Annotated[
+        np.ndarray | None,
+        In("m", 3),
         "Its middle, or a mesh's origin, in P; null: the middle of the platform's box.",
-        "m",
-        (3,),
-        None,
-    )
-    angles_deg: np.ndarray = array(
-        "Angles (phi, theta, psi) of its axes, as of a pose.", "deg", (3,), (0.0, 0.0, 0.0)
-    )
+    ] = None
+    angles_deg: Annotated[
+        np.ndarray, In("deg", 3), "Angles (phi, theta, psi) of its axes, as of a pose."
+    ] = values(0.0, 0.0, 0.0)
 
     def missing(self) -> str:
         """The key that its kind needs and that is not there; empty: none."""
@@ -225,15 +221,15 @@ def mesh_path(file: str, folder: Path) -> Path | None:
     return path if input_there(path) and path.suffix.lower() in MESH_SUFFIXES else None
 
 
-@dataclass(kw_only=True)
+@settings
 class FrameBeam:
     """A beam of the frame, of square section."""
 
-    start: np.ndarray = array("One end of its middle line in W.", "m", (3,))
-    end: np.ndarray = array("The other end.", "m", (3,))
-    width: float | None = number(
-        "Width; null: the thickness of the frame's beams.", "m", None, above=0.0
-    )
+    start: Annotated[np.ndarray, In("m", 3), "One end of its middle line in W."]
+    end: Annotated[np.ndarray, In("m", 3), "The other end."]
+    width: Annotated[
+        float | None, In("m", gt=0.0), "Width; null: the thickness of the frame's beams."
+    ] = None
 
     def length(self) -> float:
         """From end to end [m]."""
@@ -257,26 +253,25 @@ BEAM_SHARE = 1.0 / 30.0
 """Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Frame:
     """The robot's frame, a box of beams that the platform must stay in unless it was assumed."""
 
-    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
-    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    beam: float | None = number(
+    lower: Annotated[np.ndarray, In("m", 3), "Lower corner in W."]
+    upper: Annotated[np.ndarray, In("m", 3), "Upper corner in W."]
+    beam: Annotated[
+        float | None,
+        In("m", gt=0.0),
         "Thickness of the beams, for drawing; null: a share of the longest edge.",
-        "m",
-        None,
-        above=0.0,
-    )
-    beams: list[FrameBeam] = sections(
-        "Its beams, in the place of those on the edges of the box.", required=False
-    )
-    assumed: bool = switch(
-        "True if its corners were assumed, as the robot's source gives none. Such a frame bounds "
-        "default grids; it refuses no pose and limits no workspace hull.",
-        False,
-    )
+    ] = None
+    beams: Annotated[
+        list[FrameBeam], "Its beams, in the place of those on the edges of the box."
+    ] = filled(list)
+    assumed: Annotated[
+        Switch,
+        "True if its corners were assumed, as the robot's source gives none. Such a frame"
+        " bounds default grids; it refuses no pose and limits no workspace hull.",
+    ] = False
 
     def bounds(self) -> tuple[Array, Array]:
         """Corners that Po must lie within, shape (3,) each [m]; infinite where it was assumed."""

@@ -1,9 +1,6 @@
-"""Scenario section `force_control` of dynamic control, and its block: laws that answer forces.
+"""Scenario section `force_control` of dynamic control, and its block: laws that answer forces."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -39,7 +36,7 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.schema.fields import array, number, switch, text, texts
+from cdpr_drake.schema.settings import In, OneOf, Switch, filled, settings, values
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -53,59 +50,60 @@ TOUCHES = 0.2
 """Share of the wanted force from which something is touched: what is missing is gathered then."""
 
 
-@dataclass(kw_only=True)
+@settings
 class ForceControl:
     """How the platform answers forces, in the place of plain computed torque."""
 
-    kind: str = text(
-        "tracking: computed torque; impedance: a spring and damper to the trajectory, nothing is "
-        "measured; admittance: the trajectory gives way by what pushes; hybrid: a force along some "
-        "axes, the trajectory along the others.",
-        choices=(TRACKING, IMPEDANCE, ADMITTANCE, HYBRID),
-    )
-    task_angles_deg: np.ndarray = array(
-        "Axes of the task frame T in W, angles as those of a pose.", "deg", (3,), (0.0, 0.0, 0.0)
-    )
-    stiffness: np.ndarray | None = array(
+    kind: Annotated[
+        str,
+        OneOf((TRACKING, IMPEDANCE, ADMITTANCE, HYBRID)),
+        "tracking: computed torque; impedance: a spring and damper to the trajectory, "
+        "nothing is measured; admittance: the trajectory gives way by what pushes; "
+        "hybrid: a force along some axes, the trajectory along the others.",
+    ]
+    task_angles_deg: Annotated[
+        np.ndarray, In("deg", 3), "Axes of the task frame T in W, angles as those of a pose."
+    ] = values(0.0, 0.0, 0.0)
+    stiffness: Annotated[
+        np.ndarray | None,
+        In("N m/rad, N/m", 6, ge=0.0),
         "Along (rx, ry, rz, x, y, z) of T; kinds impedance and admittance.",
-        "N m/rad, N/m",
-        (6,),
-        None,
-        at_least=0.0,
+    ] = None
+    damping: Annotated[
+        np.ndarray | None, In("N m s/rad, N s/m", 6, ge=0.0), "The same of velocities."
+    ] = None
+    mass: Annotated[
+        np.ndarray | None, In("kg m^2, kg", 6, ge=0.0), "Virtual inertia of kind admittance."
+    ] = None
+    axes: Annotated[list[str], OneOf(AXES), "Axes of T along which kind hybrid presses."] = filled(
+        list
     )
-    damping: np.ndarray | None = array(
-        "The same of velocities.", "N m s/rad, N s/m", (6,), None, at_least=0.0
-    )
-    mass: np.ndarray | None = array(
-        "Virtual inertia of kind admittance.", "kg m^2, kg", (6,), None, at_least=0.0
-    )
-    axes: list[str] = texts("Axes of T along which kind hybrid presses.", choices=AXES)
-    force: np.ndarray | None = array(
-        "What kind hybrid presses with, in T: the force on what is touched.", "N", (3,), None
-    )
-    contact_stiffness: float | None = number(
+    force: Annotated[
+        np.ndarray | None,
+        In("N", 3),
+        "What kind hybrid presses with, in T: the force on what is touched.",
+    ] = None
+    contact_stiffness: Annotated[
+        float | None,
+        In("N/m", gt=0.0),
         "Stiffness that contact is believed to have, kind hybrid, which is damped by that.",
-        "N/m",
-        None,
-        above=0.0,
-    )
-    integral: float = number(
+    ] = None
+    integral: Annotated[
+        float,
+        In("1/s", ge=0.0),
         "Gain of the missing force, gathered while more than a fifth of it is there; kind hybrid.",
-        "1/s",
-        2.0,
-        at_least=0.0,
-    )
-    observer: str = text(
+    ] = 2.0
+    observer: Annotated[
+        str,
+        OneOf((MOMENTUM, EXTENDED)),
         "What estimates the wrench on the platform, from the commanded tensions.",
-        MOMENTUM,
-        choices=(MOMENTUM, EXTENDED),
-    )
-    bandwidth: float = number("Of that, over 2 pi.", "Hz", 10.0, above=0.0)
-    reject: bool = switch(
-        "Whether the estimated wrench is taken out, but along axes that press; with admittance "
-        "that leaves the platform on the trajectory that gives way.",
-        False,
-    )
+    ] = MOMENTUM
+    bandwidth: Annotated[float, In("Hz", gt=0.0), "Of that, over 2 pi."] = 10.0
+    reject: Annotated[
+        Switch,
+        "Whether the estimated wrench is taken out, but along axes that press; with "
+        "admittance that leaves the platform on the trajectory that gives way.",
+    ] = False
 
     def check(self) -> None:
         """Checks what belongs together.

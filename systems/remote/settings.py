@@ -1,39 +1,37 @@
-"""Scenario section `remote`: a process outside closes the loop.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+"""Scenario section `remote`: a process outside closes the loop."""
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from cdpr_drake.errors import ScenarioError, accepted_names
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, text
+from cdpr_drake.schema.settings import In, OneOf, settings
 from cdpr_drake.systems.remote.remote_driver import SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, TWIST
 
 PLACES = (*TENSION_PLACES, *SERVO_PLACES)
 
 
-@dataclass(kw_only=True)
+@settings
 class RemoteSettings:
     """Where a process outside stands, and how the run waits for it; see cdpr serve."""
 
-    place: str = text(
-        "Which block it replaces: distributor, controller or trajectory of dynamic control, or "
-        "servo (cable velocities) or twist (of the platform) of a visual servo.",
-        choices=PLACES,
-    )
-    pace: str = text(
+    place: Annotated[
+        str,
+        OneOf(PLACES),
+        "Which block it replaces: distributor, controller or trajectory of dynamic "
+        "control, or servo (cable velocities) or twist (of the platform) of a visual "
+        "servo.",
+    ]
+    pace: Annotated[
+        str,
+        OneOf(tuple(pace.value for pace in SyncMode)),
         "Whether the run waits for each command, or goes on in real time with the last one.",
-        SyncMode.LOCK_STEP.value,
-        choices=tuple(pace.value for pace in SyncMode),
-    )
-    timeout: float = number(
-        "Silence of the process after which the run ends.", "s", 10.0, above=0.0, at_most=86400.0
-    )
+    ] = SyncMode.LOCK_STEP.value
+    timeout: Annotated[
+        float, In("s", gt=0.0, le=86400.0), "Silence of the process after which the run ends."
+    ] = 10.0
 
 
 def check_place(settings: RemoteSettings | None, accepted: Collection[str], path: Path) -> None:

@@ -15,12 +15,10 @@ the wrench about Po is (m + p_PoQ x f, f).
   left out.
 
 Source of the spectrum: MIL-F-8785C, Flying qualities of piloted airplanes, 1980, 3.7.1.2.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import Value
@@ -30,7 +28,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.sensor_noise import sample_noise
-from cdpr_drake.schema.fields import array, number, sections, text
+from cdpr_drake.schema.settings import In, OneOf, settings, values
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 
 STEP, PUSH, SINE, WIND, PAYLOAD = "step", "push", "sine", "wind", "payload"
@@ -59,35 +57,33 @@ STREAM = 4200
 """Stream of the wind's random numbers, apart from those of sensors; one more for each wind."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Push:
     """One thing that pushes the platform."""
 
-    kind: str = text("What it is like over time.", choices=tuple(NEEDED))
-    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
-    end: float | None = number("When it ends; null: with the run.", "s", None, above=0.0)
-    force: np.ndarray | None = array("Force.", "N", (3,), None)
-    moment: np.ndarray | None = array("Moment about Po.", "N m", (3,), None)
-    frame: str = text(
+    kind: Annotated[str, OneOf(NEEDED), "What it is like over time."]
+    start: Annotated[float, In("s", ge=0.0), "When it begins."] = 0.0
+    end: Annotated[float | None, In("s", gt=0.0), "When it ends; null: with the run."] = None
+    force: Annotated[np.ndarray | None, In("N", 3), "Force."] = None
+    moment: Annotated[np.ndarray | None, In("N m", 3), "Moment about Po."] = None
+    frame: Annotated[
+        str,
+        OneOf((WORLD, PLATFORM)),
         "Axes of force and moment: those of W, or of P, which turn with the platform.",
-        WORLD,
-        choices=(WORLD, PLATFORM),
-    )
-    point: np.ndarray = array("Where the force acts, in P.", "m", (3,), (0.0, 0.0, 0.0))
-    frequency: float | None = number("Of a sine.", "Hz", None, above=0.0)
-    wind: np.ndarray | None = array("Mean wind in W.", "m/s", (3,), None)
-    drag_area: float | None = number(
-        "Drag coefficient times area that the wind meets.", "m^2", None, above=0.0
-    )
-    intensity: float | None = number(
+    ] = WORLD
+    point: Annotated[np.ndarray, In("m", 3), "Where the force acts, in P."] = values(0.0, 0.0, 0.0)
+    frequency: Annotated[float | None, In("Hz", gt=0.0), "Of a sine."] = None
+    wind: Annotated[np.ndarray | None, In("m/s", 3), "Mean wind in W."] = None
+    drag_area: Annotated[
+        float | None, In("m^2", gt=0.0), "Drag coefficient times area that the wind meets."
+    ] = None
+    intensity: Annotated[
+        float | None,
+        In("-", gt=0.0, le=1.0),
         "Of the wind's turbulence: standard deviation over mean speed; null: none.",
-        "-",
-        None,
-        above=0.0,
-        at_most=1.0,
-    )
-    length_scale: float | None = number("Of the turbulence; null: 10 m.", "m", None, above=0.0)
-    mass: float | None = number("Of a payload; below zero: it is lost.", "kg", None)
+    ] = None
+    length_scale: Annotated[float | None, In("m", gt=0.0), "Of the turbulence; null: 10 m."] = None
+    mass: Annotated[float | None, In("kg"), "Of a payload; below zero: it is lost."] = None
 
     def check(self, where: str) -> None:
         """Checks what belongs together.
@@ -168,18 +164,16 @@ class Push:
         return float(np.exp(-period * speed / length)), self.intensity * speed
 
 
-@dataclass(kw_only=True)
+@settings
 class DisturbanceSettings:
     """What pushes the platform, and how often that changes."""
 
-    pushes: list[Push] = sections("What pushes the platform; all of it adds up.")
-    rate: float = number(
+    pushes: Annotated[list[Push], "What pushes the platform; all of it adds up."]
+    rate: Annotated[
+        float,
+        In("Hz", gt=0.0, le=100000.0),
         "How often the wrench changes; between, it is that of the middle of the period.",
-        "Hz",
-        1000.0,
-        above=0.0,
-        at_most=1e5,
-    )
+    ] = 1000.0
 
     def check(self) -> None:
         """Checks every push.

@@ -12,13 +12,12 @@ Every failure begins at a time and lasts. See `FAILURES` for what there is:
   the first of that comes, it gives what it read last.
 
 A camera that goes dark is `camera.fault` of a scenario.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -32,7 +31,7 @@ from pydrake.systems.framework import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, sections, text, whole
+from cdpr_drake.schema.settings import In, OneOf, Text, filled, settings
 
 BROKEN, JAMMED, POWERLESS = FAULTS = ("broken", "jammed", "powerless")
 """Inputs and outputs of a robot block with `failures`: 1 for each cable that is broken, for each
@@ -95,26 +94,27 @@ class Equipment:
         return self.cables if name == "cable" else self.winches
 
 
-@dataclass(kw_only=True)
+@settings
 class Failure:
     """One thing that fails."""
 
-    kind: str = text("What fails.", choices=tuple(FAILURES))
-    time: float = number("When.", "s", at_least=0.0)
-    cable: int | None = whole("Number of the cable that breaks, from 0.", None, at_least=0)
-    winch: int | None = whole(
-        "Number of the winch that fails, from 0; each cable has its own, but where the robot's "
-        "file puts several on one.",
-        None,
-        at_least=0,
-    )
-    delay: float | None = number(
+    kind: Annotated[str, OneOf(FAILURES), "What fails."]
+    time: Annotated[float, In("s", ge=0.0), "When."]
+    cable: Annotated[int | None, In(ge=0), "Number of the cable that breaks, from 0."] = None
+    winch: Annotated[
+        int | None,
+        In(ge=0),
+        "Number of the winch that fails, from 0; each cable has its own, but where the "
+        "robot's file puts several on one.",
+    ] = None
+    delay: Annotated[
+        float | None,
+        In("s", ge=0.0),
         "From the time until a brake has closed, null: at once; of messages that are late.",
-        "s",
-        None,
-        at_least=0.0,
-    )
-    sensor: str | None = text("Which sensor freezes or is late, as section sensors names it.", None)
+    ] = None
+    sensor: Annotated[
+        Text | None, "Which sensor freezes or is late, as section sensors names it."
+    ] = None
 
     def check(self, where: str, has: Equipment) -> None:
         """Checks what belongs together.
@@ -173,11 +173,11 @@ class Failure:
         return self.time + (self.delay or 0.0 if self.kind == BRAKE else 0.0)
 
 
-@dataclass(kw_only=True)
+@settings
 class FailureSettings:
     """What fails at a robot."""
 
-    events: list[Failure] = sections("What fails, and when.", required=False)
+    events: Annotated[list[Failure], "What fails, and when."] = filled(list)
 
     def check(self, has: Equipment) -> None:
         """Checks every failure of a scenario.

@@ -1,11 +1,8 @@
-"""The schema of a scenario file for picking a box up and setting it down.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+"""The schema of a scenario file for picking a box up and setting it down."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -13,7 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.schema.fields import FASTEST, number, optional_section, section, text
+from cdpr_drake.schema.settings import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings
@@ -43,54 +40,56 @@ LEVEL = 1e-9
 """Turn about x or y of a pose that counts as level [deg]."""
 
 
-@dataclass(kw_only=True)
+@settings
 class PlantIntegration:
     """How the robot is integrated, with the box, which the compiled engine does not have."""
 
-    engine: str = text("What moves the robot.", PLANT, choices=(PLANT,))
-    integrator: str = text(
-        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
-    )
-    max_step: float | None = number(
-        "Step; null: a share of the largest stable one, of cables, grip and contact.", "s", None,
-        above=0.0,
-    )  # fmt: skip
+    engine: Annotated[str, OneOf((PLANT,)), "What moves the robot."] = PLANT
+    integrator: Annotated[
+        str, OneOf(explicit_integrators()), "Explicit integrator of Drake, fixed step."
+    ] = "runge_kutta3"
+    max_step: Annotated[
+        float | None,
+        In("s", gt=0.0),
+        "Step; null: a share of the largest stable one, of cables, grip and contact.",
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class DeadReckoning:
     """How the robot knows its own pose, and goes on while it sees no tag."""
 
-    kind: str = text("Estimator.", "control_integration", choices=DEAD_RECKONING)
+    kind: Annotated[str, OneOf(DEAD_RECKONING), "Estimator."] = "control_integration"
 
 
-@dataclass(kw_only=True)
+@settings
 class PickAndPlaceScenario(CableRobotSettings, ScenarioHeader):
     """One run of a robot that looks for a box, takes it, and sets it down at a goal."""
 
-    kind: str = text("Kind of run.", choices=(PICK_AND_PLACE,))
-    initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
-    workpiece: WorkpieceSettings = section("The box.", WorkpieceSettings)
-    goal: GoalSettings = section("Where it is to go.", GoalSettings)
-    scatter: ScatterSettings = section(
-        "How far both truly are from there.", ScatterSettings, required=False
+    kind: Annotated[str, OneOf((PICK_AND_PLACE,)), "Kind of run."]
+    initial_pose: Annotated[Pose, "Pose of the platform in W at time 0."]
+    workpiece: Annotated[WorkpieceSettings, "The box."]
+    goal: Annotated[GoalSettings, "Where it is to go."]
+    scatter: Annotated[ScatterSettings, "How far both truly are from there."] = filled(
+        ScatterSettings
     )
-    gripper: GripperSettings = section("The gripper.", GripperSettings, required=False)
-    camera: BoxCameraSettings = section("The cameras.", BoxCameraSettings, required=False)
-    goal_camera: GoalCameraSettings | None = optional_section(
-        "A second camera, which looks at the goal; null: the first one looks at both."
+    gripper: Annotated[GripperSettings, "The gripper."] = filled(GripperSettings)
+    camera: Annotated[BoxCameraSettings, "The cameras."] = filled(BoxCameraSettings)
+    goal_camera: Annotated[
+        GoalCameraSettings | None,
+        "A second camera, which looks at the goal; null: the first one looks at both.",
+    ] = None
+    cover: Annotated[CoverSettings | None, "What hides a tag for a while; null: nothing does."] = (
+        None
     )
-    cover: CoverSettings | None = optional_section(
-        "What hides a tag for a while; null: nothing does."
+    handling: Annotated[HandlingSettings, "The servo, and when phases end."] = filled(
+        HandlingSettings
     )
-    handling: HandlingSettings = section(
-        "The servo, and when phases end.", HandlingSettings, required=False
-    )
-    estimator: DeadReckoning = section("Dead reckoning.", DeadReckoning, required=False)
-    sensors: SensorSettings = section("Sensors of dead reckoning.", SensorSettings, required=False)
-    perturbations: HandlingErrors = section("Model errors.", HandlingErrors, required=False)
-    integration: PlantIntegration = section("Integration.", PlantIntegration, required=False)
-    log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)
+    estimator: Annotated[DeadReckoning, "Dead reckoning."] = filled(DeadReckoning)
+    sensors: Annotated[SensorSettings, "Sensors of dead reckoning."] = filled(SensorSettings)
+    perturbations: Annotated[HandlingErrors, "Model errors."] = filled(HandlingErrors)
+    integration: Annotated[PlantIntegration, "Integration."] = filled(PlantIntegration)
+    log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0
 
     @property
     def remote(self) -> None:

@@ -1,32 +1,33 @@
 """Classes with a schema: `help` has the words, units and ranges of all their fields."""
 
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from typing import Annotated
 
 import pytest
 
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, section, text
+from cdpr_drake.schema.settings import In, OneOf, filled, settings
 from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sensors.sensor_settings import SensorSuite
 
 
-@dataclass(kw_only=True)
+@settings
 class Spring:
     """A spring.
 
     It is straight.
     """
 
-    stiffness: float = number("How stiff.", "N/m", above=0.0)
-    kind: str = text("Which.", "soft", choices=("soft", "hard"))
+    stiffness: Annotated[float, In("N/m", gt=0.0), "How stiff."]
+    kind: Annotated[str, OneOf(("soft", "hard")), "Which."] = "soft"
 
 
-@dataclass(kw_only=True)
+@settings
 class Suspension(Spring):
-    kind: str = text("Which it is now.", "hard", choices=("hard",))
-    inner: Spring = section("Another one.", Spring, required=False)
+    kind: Annotated[str, OneOf(("hard",)), "Which it is now."] = "hard"
+    inner: Annotated[Spring, "Another one."] = filled(Spring)
 
 
 def test_words_units_and_ranges_stand_behind_the_class_s_own_words():

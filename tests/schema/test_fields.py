@@ -8,9 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-
 from cdpr_drake.schema.fields import (
     FieldRule,
     array,
@@ -22,6 +19,8 @@ from cdpr_drake.schema.fields import (
     text,
     whole,
 )
+from hypothesis import given
+from hypothesis import strategies as st
 
 
 @dataclass(kw_only=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cdpr_drake.schema.fields import text
 
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
@@ -15,7 +16,6 @@ from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, HELD, export_omissions
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import text
 from tests.messages import printed
 from tests.models.formats.meanings import fields_that_differ, schema_keys
 from tests.models.formats.unusual_robots import (
