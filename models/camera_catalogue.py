@@ -14,7 +14,7 @@ import numpy as np
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_calibrations import read_calibration
 from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
-from cdpr_drake.schema.settings import In, OneOf, Text, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Text, settings, values
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, FARTHEST, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole

@@ -12,7 +12,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.settings import In, settings, values
+from cdpr_drake.schema.declarations import In, settings, values
 
 MARK = "@"
 """Between the name of a robot and where its exit points stand on their rails."""

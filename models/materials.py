@@ -6,7 +6,7 @@ from dataclasses import asdict, fields, replace
 from typing import Annotated, Any
 
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
-from cdpr_drake.schema.settings import In, settings
+from cdpr_drake.schema.declarations import In, settings
 
 
 @settings

@@ -12,7 +12,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.robot_schema import Pose, TensionBounds
-from cdpr_drake.schema.settings import In, Name, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, Name, Text, filled, settings, values
 from cdpr_drake.summaries import Summarized
 
 WORLD = "world"

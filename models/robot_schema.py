@@ -18,7 +18,7 @@ from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.shapes import Frame, PlatformShape
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema.settings import In, Name, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, Name, OneOf, Text, filled, settings, values
 from cdpr_drake.summaries import Summarized, numbers
 
 if TYPE_CHECKING:  # statics need none of them

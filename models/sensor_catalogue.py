@@ -7,7 +7,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.settings import FASTEST, In, Text, settings
+from cdpr_drake.schema.declarations import FASTEST, In, Text, settings
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "sensors"

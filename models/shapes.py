@@ -14,8 +14,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.schema.declarations import In, OneOf, Switch, Text, filled, settings, values
 from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
-from cdpr_drake.schema.settings import In, OneOf, Switch, Text, filled, settings, values
 
 if TYPE_CHECKING:  # slow to import, and most robots are boxes
     from pydrake.geometry import Shape

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.settings import In, filled, settings
+from cdpr_drake.schema.declarations import In, filled, settings
 
 if TYPE_CHECKING:  # statics need no winches
     from cdpr_drake.winches.drum import Drum

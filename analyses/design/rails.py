@@ -11,7 +11,7 @@ from cdpr_drake.errors import DataFileError, PlanningError
 from cdpr_drake.models.exit_points import Rail
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.reconfiguration import Rails
-from cdpr_drake.schema.settings import In, Text, filled, settings
+from cdpr_drake.schema.declarations import In, Text, filled, settings
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.summaries import numbers
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cdpr_drake.analyses.design.goals import GOALS
 from cdpr_drake.errors import DesignError
-from cdpr_drake.schema.settings import In, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 
 AXES = {"x": (0,), "y": (1,), "z": (2,), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}

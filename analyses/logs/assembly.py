@@ -30,7 +30,7 @@ from cdpr_drake.analyses.logs.columns import (
 )
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, same_as_before
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.settings import LARGEST
+from cdpr_drake.schema.declarations import LARGEST
 
 Cells = Sequence[str] | Array
 """A column: words of a text, or numbers."""

@@ -10,7 +10,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BoundsFileError
 from cdpr_drake.models.robot_loader import robot_file, robot_names
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.settings import In, OneOf, Text, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Text, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 from cdpr_drake.servoing.turned_view import encoder_turn
 from cdpr_drake.stability.perturbation_bounds import (

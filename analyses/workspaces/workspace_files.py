@@ -18,7 +18,7 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import In, Switch, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 from cdpr_drake.systems.worlds.checks import motion_problems
 from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from cdpr_drake.schema.settings import Setting, settings_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

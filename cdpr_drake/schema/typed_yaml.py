@@ -8,16 +8,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numpy as np
 import yaml
 
 from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
-from cdpr_drake.schema.settings import Setting, settings_of
 from cdpr_drake.schema.yaml_files import (
     YamlTextError,
     compose_yaml,
@@ -79,7 +79,7 @@ def parse_typed(
     """As `load_typed`, of YAML that is there already; `path` is the file that messages name."""
     known = settings_of(schema)
     try:
-        root = compose_yaml(content)
+        root = _nodes(content)
     except YamlTextError as problem:
         raise error(problem.at(path)) from problem
     if not isinstance(root, yaml.MappingNode):
@@ -95,11 +95,17 @@ def parse_typed(
     from pydantic import ValidationError
 
     try:
-        made: T = _adapter(schema).validate_python(data)
+        made: T = _adapter(cast(Any, schema)).validate_python(data)
     except ValidationError as problem:
         problems.add_all(problem.errors(include_url=False, include_context=False))
     problems.raise_any()
     return made
+
+
+@lru_cache(32)
+def _nodes(content: str) -> yaml.Node | None:
+    """Nodes, which nothing here changes; the same files are read again and again."""
+    return compose_yaml(content)
 
 
 @cache
@@ -279,10 +285,11 @@ class _Problems:
         if isinstance(value, yaml.ScalarNode):
             tag = value.tag.replace(_TAG, "!!")[:80]
             return f"found the tag {tag}; accepted: a value without one"
-        words = value if isinstance(value, str) else ""
-        hint = "".join(f"did you mean {name}? " for name in meant_names(words, setting.choices))
+        words, choices = value if isinstance(value, str) else "", setting.choices
         if setting.many and error["loc"][-1] != setting.name:  # one of several
             setting = dataclasses.replace(setting, many=None)
+        likely = () if setting.many else meant_names(words, choices)
+        hint = "".join(f"did you mean {name}? " for name in likely)
         return f"found {shown(value)}; {hint}accepted: {setting.accepts(words)}"
 
     def raise_any(self) -> None:

@@ -8,14 +8,13 @@ aliases are expanded: files of robots and scenarios are small, and a bomb is tol
 from __future__ import annotations
 
 from collections.abc import Collection
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 from yaml.composer import Composer
 from yaml.constructor import SafeConstructor
-from yaml.cyaml import CParser
+from yaml.cyaml import CParser  # type: ignore[attr-defined]
 from yaml.resolver import Resolver
 
 from cdpr_drake.errors import CdprError
@@ -71,7 +70,7 @@ class _Reader(Composer, CParser, SafeConstructor, Resolver):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         self.depth += 1
         if self.depth > MOST_DEPTH:
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            mark: Any = self.peek_event().start_mark  # type: ignore[union-attr]
             words = f"nested more than {MOST_DEPTH} deep"
             raise yaml.composer.ComposerError(None, None, words, mark)
         node: yaml.Node | None = super().compose_node(parent, index)
@@ -85,12 +84,11 @@ class _Reader(Composer, CParser, SafeConstructor, Resolver):
         return int(super().construct_yaml_int(node))
 
 
-_Reader.add_constructor("tag:yaml.org,2002:int", _Reader.construct_yaml_int)
+_Reader.add_constructor("tag:yaml.org,2002:int", _Reader.construct_yaml_int)  # type: ignore[type-var]
 
 
-@lru_cache(32)
 def compose_yaml(content: str) -> yaml.Node | None:
-    """The nodes of a YAML text, not to be changed, since they are kept; None: it is empty.
+    """The nodes of a YAML text; None: it is empty.
 
     Raises:
         YamlTextError: It is none, is larger than `MOST_BYTES`, is nested deeper than `MOST_DEPTH`,

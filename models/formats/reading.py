@@ -13,9 +13,9 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.schema.declarations import LARGEST, NAME
 from cdpr_drake.schema.input_files import input_bytes, input_size
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.schema.settings import LARGEST, NAME
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 
 MOST_BYTES = 4_194_304

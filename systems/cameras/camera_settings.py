@@ -7,7 +7,7 @@ from typing import Annotated
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_problem, load_camera
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Text, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, settings
 from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.vision.image_flaws import ImageFlaws
 from cdpr_drake.vision.pinhole import Pinhole

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cdpr_drake.schema.settings import FASTEST, In, settings, values
+from cdpr_drake.schema.declarations import FASTEST, In, settings, values
 
 
 @settings

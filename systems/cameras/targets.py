@@ -9,7 +9,7 @@ from typing import Annotated, Protocol
 import numpy as np
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import In, OneOf, Switch, filled, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings, values
 from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 from cdpr_drake.trajectories.pose_trajectory import MovingPose, SteadyMotion, WaypointMotion
 from cdpr_drake.vision.apriltags import TAG_COUNT, TagBundle, TagTarget

@@ -25,7 +25,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.break_detection import BreakRule, residual_noise
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, rotation_vector
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 
 STOP, REDISTRIBUTE, BRAKE, RETREAT, DESCEND = REACTIONS = (
     "stop", "redistribute", "brake", "retreat", "descend",

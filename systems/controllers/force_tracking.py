@@ -36,7 +36,7 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.schema.settings import In, OneOf, Switch, filled, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings, values
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 

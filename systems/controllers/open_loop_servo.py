@@ -15,7 +15,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import In, filled, settings
+from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.servo_law import saturation_share
 from cdpr_drake.servoing.servo_task import BelievedRobot

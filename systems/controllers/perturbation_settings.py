@@ -6,7 +6,7 @@ import numpy as np
 
 from cdpr_drake.models.camera_catalogue import Distortion
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import In, Switch, Text, filled, settings
+from cdpr_drake.schema.declarations import In, Switch, Text, filled, settings
 
 
 @settings

@@ -16,7 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.settings import In, settings
+from cdpr_drake.schema.declarations import In, settings
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.servo_law import saturation_share
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Switch, filled, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, filled, settings
 from cdpr_drake.servoing.feature_plan import PROFILES
 from cdpr_drake.servoing.servo_law import FRAMES, GOALS, MODES
 from cdpr_drake.servoing.servo_task import INTERACTIONS

@@ -4,7 +4,7 @@ from typing import Annotated
 
 import numpy as np
 
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Text, settings, values
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, settings, values
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.tensions.slack_correction import SHAPES
 

@@ -5,7 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from cdpr_drake.control.torque_law import ServoWrench, TensionController
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.winches.friction import FrictionLaw
 

@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
 from cdpr_drake.geometry.motion_type import FREE, LEVEL
-from cdpr_drake.schema.settings import OneOf, filled, settings
+from cdpr_drake.schema.declarations import OneOf, filled, settings
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.estimators.basic_estimators import (
     ControlIntegration,

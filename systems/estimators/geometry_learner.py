@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.settings import In, Switch, settings
+from cdpr_drake.schema.declarations import In, Switch, settings
 from cdpr_drake.systems.estimators.recursive_calibration import (
     CORNER_ROWS,
     Beforehand,

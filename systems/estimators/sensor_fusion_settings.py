@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from cdpr_drake.models.sensor_catalogue import depth_sensor_names
-from cdpr_drake.schema.settings import In, OneOf, Switch, settings
+from cdpr_drake.schema.declarations import In, OneOf, Switch, settings
 
 
 @settings

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from cdpr_drake.models.camera_catalogue import CameraFault
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import FASTEST, In, Switch, Text, settings
+from cdpr_drake.schema.declarations import FASTEST, In, Switch, Text, settings
 from cdpr_drake.vision.apriltags import TAG_COUNT, TagTarget
 
 

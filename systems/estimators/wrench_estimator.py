@@ -26,7 +26,7 @@ from cdpr_drake.estimation.wrench_observers import (
 )
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths

@@ -18,7 +18,7 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.schema.settings import In, settings
+from cdpr_drake.schema.declarations import In, settings
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.servoing.visual_features import VisualFeatures
 from cdpr_drake.stability.criterion import ModelAtPose, stability_margin, stability_matrix

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cdpr_drake.errors import ScenarioError, accepted_names
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.settings import In, OneOf, settings
+from cdpr_drake.schema.declarations import In, OneOf, settings
 from cdpr_drake.systems.remote.remote_driver import SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, TWIST
 

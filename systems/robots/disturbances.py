@@ -28,7 +28,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.sensor_noise import sample_noise
-from cdpr_drake.schema.settings import In, OneOf, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, settings, values
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 
 STEP, PUSH, SINE, WIND, PAYLOAD = "step", "push", "sine", "wind", "payload"

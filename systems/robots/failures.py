@@ -31,7 +31,7 @@ from pydrake.systems.framework import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.settings import In, OneOf, Text, filled, settings
+from cdpr_drake.schema.declarations import In, OneOf, Text, filled, settings
 
 BROKEN, JAMMED, POWERLESS = FAULTS = ("broken", "jammed", "powerless")
 """Inputs and outputs of a robot block with `failures`: 1 for each cable that is broken, for each

@@ -11,7 +11,7 @@ from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.settings import In, OneOf, Switch, filled, settings
+from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.failures import Failures, FailureSettings
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS

@@ -13,7 +13,7 @@ import numpy as np
 from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Text, filled, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, filled, settings
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableSettings
 from cdpr_drake.systems.scenarios.files import MECHANISM
 from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd, RunHeader

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, filled, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.systems.robots.disturbances import check_disturbances
 from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings

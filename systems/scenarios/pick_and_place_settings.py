@@ -6,7 +6,7 @@ import numpy as np
 
 from cdpr_drake.models.camera_files import camera_names
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, filled, settings, values
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED, RENDERED
 from cdpr_drake.systems.controllers.perturbation_settings import PoseShift
 from cdpr_drake.vision.apriltags import TAG_COUNT, TagTarget

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Annotated, Any, TypeVar
 
 from cdpr_drake.dynamics.explicit_kernel import METHODS
-from cdpr_drake.schema.settings import In, Name, OneOf, Switch, Text, settings
+from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, settings
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, PLANT
 from cdpr_drake.systems.worlds.settings import WorldSettings

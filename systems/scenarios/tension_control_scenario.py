@@ -17,7 +17,7 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.planning.horizon import View
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, Switch, Text, filled, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, Text, filled, settings
 from cdpr_drake.systems.controllers.force_tracking import ForceControl
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule

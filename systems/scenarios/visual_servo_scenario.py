@@ -7,7 +7,7 @@ what it believes. `Scenario` adds the robot, and when and how it is run.
 from typing import Annotated
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.settings import FASTEST, In, OneOf, filled, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
 from cdpr_drake.systems.controllers.emergency import EmergencySettings

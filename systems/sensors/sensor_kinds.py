@@ -20,7 +20,7 @@ from cdpr_drake.models.sensor_catalogue import (
     pose_sensor_names,
     tension_sensor_names,
 )
-from cdpr_drake.schema.settings import In, OneOf, filled, settings
+from cdpr_drake.schema.declarations import In, OneOf, filled, settings
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor

@@ -18,7 +18,7 @@ from cdpr_drake.models.sensor_catalogue import (
     load_range_sensor,
     range_sensor_names,
 )
-from cdpr_drake.schema.settings import FASTEST, In, Name, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import FASTEST, In, Name, OneOf, Text, filled, settings, values
 from cdpr_drake.systems.sensors.depth_sensor import binned
 from cdpr_drake.systems.sensors.pan_tilt import MODES, PanTiltJoints
 from cdpr_drake.systems.sensors.scene_shapes import ROLES

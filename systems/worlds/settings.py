@@ -7,8 +7,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.models.robot_schema import Pose
+from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, filled, settings, values
 from cdpr_drake.schema.input_files import input_there
-from cdpr_drake.schema.settings import In, Name, OneOf, Switch, Text, filled, settings, values
 from cdpr_drake.systems.worlds.motions import BodyMotion, JointedBody, PathBody, SteadyBody
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import DataFileError
-from cdpr_drake.schema.settings import In, OneOf, Switch, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, OneOf, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 
 

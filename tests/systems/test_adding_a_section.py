@@ -7,7 +7,7 @@ from pydrake.systems.framework import LeafSystem
 
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.schema.settings import In, filled, settings
+from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 

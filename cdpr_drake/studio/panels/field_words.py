@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.schema.settings import Setting
+from cdpr_drake.schema.declarations import Setting
 
 SHORT = 3
 """Arrays of so many numbers that have to be there get a field for each number."""

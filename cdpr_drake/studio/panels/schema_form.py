@@ -9,7 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.settings import Setting, settings_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.panels.field_words import (
     axis_names,

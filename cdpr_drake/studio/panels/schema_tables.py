@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from cdpr_drake.palette import nth_look
-from cdpr_drake.schema.settings import Setting, settings_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.studio.panels.field_words import axis_names, hint, in_parts, typed_value
 from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at

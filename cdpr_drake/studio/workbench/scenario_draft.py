@@ -16,7 +16,7 @@ import yaml
 import cdpr_drake
 from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, DataFileError, ScenarioError
-from cdpr_drake.schema.settings import Setting, settings_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.typed_yaml import plain_values
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import check_moves_robot

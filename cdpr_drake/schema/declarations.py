@@ -18,7 +18,6 @@ import re
 import types
 import typing
 from collections.abc import Callable, Collection
-from functools import cache
 from typing import Annotated, Any, dataclass_transform, get_args, get_origin
 
 import numpy as np
@@ -355,11 +354,16 @@ class Setting:
         return words + " or null" * self.nullable
 
 
-@cache
-def settings_of(schema: Any) -> dict[str, Setting]:
-    """The fields of a class of settings by name."""
-    hints = typing.get_type_hints(schema, include_extras=True)
-    return {field.name: _setting(field, hints[field.name]) for field in dataclasses.fields(schema)}
+_KNOWN: dict[type, dict[str, Setting]] = {}
+
+
+def settings_of(schema: type) -> dict[str, Setting]:
+    """The fields of a class of settings by name; found once, and not to be changed."""
+    if schema not in _KNOWN:
+        hints = typing.get_type_hints(schema, include_extras=True)
+        fields = dataclasses.fields(schema)
+        _KNOWN[schema] = {field.name: _setting(field, hints[field.name]) for field in fields}
+    return _KNOWN[schema]
 
 
 def _setting(field: dataclasses.Field[Any], hint: Any) -> Setting:
