@@ -4,7 +4,7 @@
 `Pulley` and `PlatformPulley` are schemas of swivelling pulleys.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.declarations import In, settings, values
+from cdpr_drake.schema.declarations import LONGEST, Direction, In, Refusal, Scope, settings, values
 
 MARK = "@"
 """Between the name of a robot and where its exit points stand on their rails."""
@@ -22,9 +22,7 @@ MARK = "@"
 class Rail:
     """A straight rail on which an exit point can be put; it stands still while the robot moves."""
 
-    axis: Annotated[
-        np.ndarray, In("-", 3), "Direction in W in which the coordinate grows; of any length."
-    ]
+    axis: Annotated[Direction, "Direction in W in which the coordinate grows; of any length."]
     lower: Annotated[float, In("m"), "Smallest coordinate."]
     upper: Annotated[float, In("m"), "Largest coordinate."]
     at: Annotated[float, In("m"), "Coordinate, counted from `exit_point`."] = 0.0
@@ -32,6 +30,13 @@ class Rail:
     def shift(self) -> Array:
         """From `exit_point` to where the cable leaves, shape (3,) [m]."""
         return np.asarray(self.at * self.axis / np.linalg.norm(self.axis), float)
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A rail without length, and a coordinate beyond its ends."""
+        if not self.lower < self.upper:
+            yield "", f"lower {self.lower:g}, upper {self.upper:g}", "lower < upper"
+        elif not self.lower <= self.at <= self.upper:
+            yield "at", f"{self.at:g}", f"{self.lower:g} to {self.upper:g} [m]"
 
 
 def split_name(words: str) -> tuple[str, dict[str, float]]:
@@ -59,33 +64,13 @@ def split_name(words: str) -> tuple[str, dict[str, float]]:
     return name, found
 
 
-def check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
-    """Checks one rail; whether it has a direction."""
-    if rail is None:
-        return True
-    key = f"cables[{index}].rail"
-    if not np.any(rail.axis):
-        fail(
-            f"{key}.axis",
-            "(" + ", ".join(f"{x:g}" for x in rail.axis) + ")",
-            "a direction, not zero",
-        )
-        return False
-    if not rail.lower < rail.upper:
-        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
-    elif not rail.lower <= rail.at <= rail.upper:
-        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
-    return True
-
-
 @settings
 class Pulley:
     """The swivelling pulleys at the exit points."""
 
-    radius: Annotated[float, In("m", ge=0.0), "Radius of the groove."]
+    radius: Annotated[float, In("m", ge=0.0, le=LONGEST), "Radius of the groove."]
     swivel_axis: Annotated[
-        np.ndarray,
-        In("-", 3),
+        Direction,
         "Direction in W in which the cable arrives at the exit point from its winch, and "
         "about which the pulley swivels; of any length.",
     ] = values(0.0, 0.0, 1.0)
@@ -104,8 +89,7 @@ class PlatformPulley:
 
     radius: Annotated[float, In("m", ge=0.0), "Radius of the groove."]
     swivel_axis: Annotated[
-        np.ndarray,
-        In("-", 3),
+        Direction,
         "Direction in P in which the cable arrives at the anchor point from where it is "
         "fixed, and about which the pulley swivels; of any length.",
     ] = values(0.0, 0.0, 1.0)

@@ -1,8 +1,7 @@
 """Materials of cables: one for all of a robot, and what single cables have of their own."""
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from typing import Annotated, Any
 
 from cdpr_drake.cables.cable_behaviour import CableBehaviour
@@ -55,9 +54,9 @@ class BehaviourSettings:
 class CableMaterial:
     """What the cables are made of; a cable's own `material` goes before it, key by key."""
 
-    youngs_modulus: Annotated[float, In("Pa", gt=0.0), "Young's modulus."]
-    diameter: Annotated[float, In("m", gt=0.0), "Diameter."]
-    linear_density: Annotated[float, In("kg/m", gt=0.0), "Mass per length."]
+    youngs_modulus: Annotated[float, In("Pa", gt=0.0, le=1e13), "Young's modulus."]
+    diameter: Annotated[float, In("m", gt=0.0, le=1.0), "Diameter."]
+    linear_density: Annotated[float, In("kg/m", gt=0.0, le=1e4), "Mass per length."]
     retardation_time: Annotated[
         float,
         In("s", ge=0.0, le=1.0),
@@ -80,9 +79,9 @@ class CableMaterial:
 class OwnMaterial:
     """What one cable is made of where that differs from the section `cable` of its robot."""
 
-    youngs_modulus: Annotated[float | None, In("Pa", gt=0.0), "Young's modulus."] = None
-    diameter: Annotated[float | None, In("m", gt=0.0), "Diameter."] = None
-    linear_density: Annotated[float | None, In("kg/m", gt=0.0), "Mass per length."] = None
+    youngs_modulus: Annotated[float | None, In("Pa", gt=0.0, le=1e13), "Young's modulus."] = None
+    diameter: Annotated[float | None, In("m", gt=0.0, le=1.0), "Diameter."] = None
+    linear_density: Annotated[float | None, In("kg/m", gt=0.0, le=1e4), "Mass per length."] = None
     retardation_time: Annotated[
         float | None, In("s", ge=0.0, le=1.0), "Time T of the viscous damping."
     ] = None
@@ -103,25 +102,3 @@ def own_material(common: CableMaterial, own: OwnMaterial | None) -> CableMateria
     """The material of one cable: its own values, and the common one's where it gives none."""
     given: dict[str, Any] = {**given_material(own)}
     return replace(common, **given)
-
-
-_MOST = {
-    "youngs_modulus": (1e13, "Pa"), "diameter": (1.0, "m"), "linear_density": (1e4, "kg/m"),
-    "retardation_time": (1e3, "s"),
-}  # fmt: skip
-"""Largest values of a material that make sense."""
-
-
-def check_materials(
-    common: CableMaterial,
-    own: Sequence[OwnMaterial | None],
-    fail: Callable[[str, object, str], None],
-) -> None:
-    """Refuses values that no cable has, by `fail`: field, what was found, what is accepted."""
-    given = {"cable": asdict(common)} | {
-        f"cables[{index}].material": given_material(material) for index, material in enumerate(own)
-    }
-    for where, values in given.items():
-        for key, (most, unit) in _MOST.items():
-            if values.get(key, 0.0) > most:
-                fail(f"{where}.{key}", f"{values[key]:g}", f"at most {most:g} [{unit}]")

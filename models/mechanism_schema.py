@@ -4,6 +4,7 @@
 and cables that run between any of its frames. Both share materials and tension bounds.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -12,8 +13,27 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.robot_schema import Pose, TensionBounds
-from cdpr_drake.schema.declarations import In, Name, Text, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    Direction,
+    In,
+    Name,
+    Point,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    repeated,
+    settings,
+    values,
+)
+from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.summaries import Summarized
+
+URL = "package://"
+"""How the name of a file of a package begins."""
+
+MODEL_SUFFIXES = (".dmd.yaml", ".dmd.yml", ".urdf", ".sdf", ".xml")
+"""Of files of bodies and joints: Drake's model directives, URDF, SDFormat, MJCF."""
 
 WORLD = "world"
 """Name of the world's frame in files of mechanisms."""
@@ -24,7 +44,7 @@ class Eyelet:
     """A point that a cable runs through without friction."""
 
     frame: Annotated[Text, "Frame that carries it."]
-    point: Annotated[np.ndarray, In("m", 3), "Where it is in that frame."]
+    point: Annotated[Point, "Where it is in that frame."]
 
 
 @settings
@@ -33,8 +53,7 @@ class EndPulley:
 
     radius: Annotated[float, In("m", ge=0.0), "Radius of the groove."]
     swivel_axis: Annotated[
-        np.ndarray,
-        In("-", 3),
+        Direction,
         "Axis about which a pulley swivels, in the frame of its point, in the direction "
         "in which the cable arrives from where it is wound or fixed; of any length.",
     ] = values(0.0, 0.0, 1.0)
@@ -45,24 +64,22 @@ class MechanismCable:
     """One cable, from a point in a frame, through eyelets, to a point in a frame."""
 
     name: Annotated[Name, "Name, once in a mechanism."]
-    exit_point: Annotated[np.ndarray, In("m", 3), "Exit point in `exit_frame`."]
+    exit_point: Annotated[Point, "Exit point in `exit_frame`."]
     exit_frame: Annotated[
         Text, "Frame or body of the exit point, as model::frame, or as frame where that is one."
     ] = WORLD
     via: Annotated[list[Eyelet], "Eyelets from the exit to the anchor point."] = filled(list)
-    anchor_point: Annotated[np.ndarray, In("m", 3), "Anchor point in `anchor_frame`."]
+    anchor_point: Annotated[Point, "Anchor point in `anchor_frame`."]
     anchor_frame: Annotated[Text, "Frame or body of the anchor point."]
     swivel_axis: Annotated[
-        np.ndarray | None,
-        In("-", 3),
+        Direction | None,
         "Swivel axis of its pulley, in `exit_frame`; null: that of `pulley`.",
     ] = None
     pulley_radius: Annotated[
         float | None, In("m", ge=0.0), "Radius of the groove of its pulley; null: that of `pulley`."
     ] = None
     anchor_swivel_axis: Annotated[
-        np.ndarray | None,
-        In("-", 3),
+        Direction | None,
         "Swivel axis of its pulley at the anchor point, in `anchor_frame`; null: that of "
         "`anchor_pulley`.",
     ] = None
@@ -115,10 +132,12 @@ class Mechanism(Summarized):
         "Folders of packages by name, relative to this file, for package:// beside those "
         "with a package.xml beside or above this file.",
     ] = filled(dict)
-    gravity: Annotated[float, In("m/s^2", ge=0.0), "Acceleration along `gravity_direction`."] = 9.81
-    gravity_direction: Annotated[
-        np.ndarray, In("-", 3), "Where gravity points in W, of any length."
-    ] = values(0.0, 0.0, -1.0)
+    gravity: Annotated[
+        float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
+    ] = 9.81
+    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+        0.0, 0.0, -1.0
+    )
     cable: Annotated[
         CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
     ]
@@ -134,6 +153,24 @@ class Mechanism(Summarized):
     ] = filled(MechanismHome)
     cables: Annotated[list[MechanismCable], "The cables, in the order of all vectors of m."]
     assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What no mechanism is; what Drake refuses of its bodies is told when they are read."""
+        if not self.cables:
+            yield "cables", "none", "at least one cable"
+        yield from repeated((cable.name for cable in self.cables), "cables[{}].name")
+        if self.cable.behaviour is not None:
+            yield "cable.behaviour", "a section", "null: mechanisms have elastic cables"
+        for name, folder in self.packages.items():
+            if not Path(folder).is_dir():
+                yield f"packages.{name}", folder, "a folder"
+        if not self.mechanism.lower().endswith(MODEL_SUFFIXES):
+            yield "mechanism", self.mechanism, f"a file that ends in {', '.join(MODEL_SUFFIXES)}"
+        elif self.mechanism.startswith(URL):
+            known = ", ".join(self.packages) or "none is known"
+            yield "mechanism", self.mechanism, f"a file of a package: {known}; or the key packages"
+        elif not input_there(Path(self.mechanism)):
+            yield "mechanism", self.mechanism, "a file that is there"
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""

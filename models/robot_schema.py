@@ -1,5 +1,6 @@
 """The schema of a robot file: what a cable robot is, with units and accepted ranges."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -16,9 +17,24 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
-from cdpr_drake.models.shapes import Frame, PlatformShape
+from cdpr_drake.models.robot_refusals import robot_refusals
+from cdpr_drake.models.shapes import FITS, Frame, PlatformShape
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema.declarations import In, Name, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    LONGEST,
+    Direction,
+    In,
+    Name,
+    OneOf,
+    Point,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    number_words,
+    settings,
+    values,
+)
 from cdpr_drake.summaries import Summarized, numbers
 
 if TYPE_CHECKING:  # statics need none of them
@@ -31,11 +47,15 @@ if TYPE_CHECKING:  # statics need none of them
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
 
+TRIANGLE_ROUNDING = 1e-15
+"""Moments of inertia of a plate meet the triangle inequality exactly, up to rounding."""
+
+
 @settings
 class Pose:
     """A pose as the literature of cable robots writes it, R = Rx(phi) Ry(theta) Rz(psi)."""
 
-    position: Annotated[np.ndarray, In("m", 3), "Position (x, y, z)."]
+    position: Annotated[Point, "Position (x, y, z)."]
     angles_deg: Annotated[np.ndarray, In("deg", 3), "Angles (phi, theta, psi)."] = values(
         0.0, 0.0, 0.0
     )
@@ -74,8 +94,10 @@ class Platform:
     """The moving platform; its frame P lies at the middle of the bottom face, z up, unless
     `box_center` says otherwise."""
 
-    mass: Annotated[float, In("kg", gt=0.0), "Mass."]
-    size: Annotated[np.ndarray, In("m", 3, gt=0.0), "Edges of its box along x, y, z of P."]
+    mass: Annotated[float, In("kg", gt=0.0, le=1e7), "Mass."]
+    size: Annotated[
+        np.ndarray, In("m", 3, gt=0.0, le=LONGEST), "Edges of its box along x, y, z of P."
+    ]
     box_center: Annotated[
         np.ndarray | None,
         In("m", 3),
@@ -108,6 +130,43 @@ class Platform:
         " that hang on it; null: none.",
     ] = None
 
+    def middle(self) -> Array:
+        """Middle of the box in P, shape (3,) [m]."""
+        if self.box_center is not None:
+            return np.asarray(self.box_center, float)
+        return np.array([0.0, 0.0, self.size[2] / 2.0])
+
+    def rotational_inertia(self) -> Array:
+        """About the centre of mass, axes of P, shape (3, 3) [kg m^2]; of a box if not given."""
+        if self.inertia is None:
+            x, y, z = np.square(self.size)
+            return self.mass / 12.0 * np.diag([y + z, x + z, x + y])
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Moments of inertia that no body has, and a shape that reaches out of the box."""
+        if self.inertia is not None:
+            least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
+            if least <= 0.0 or least + middle < most * (1.0 - TRIANGLE_ROUNDING):
+                accepted = "positive principal moments, none larger than the sum of the other two"
+                yield "inertia", number_words(self.inertia), accepted
+        is_of_shape = self.inertia_of == SHAPE_INERTIA
+        if self.shape is None and is_of_shape:
+            yield "inertia_of", "shape", "box, or a section platform.shape"
+        if self.shape is None or any(self.shape.refusals(scope)):
+            return
+        center, edges = self.middle(), np.asarray(self.size, float)
+        lowest, highest = center - edges / 2.0, center + edges / 2.0
+        slack = FITS * float(np.max(edges))
+        lower, upper = self.shape.extent(center)
+        if np.any(lower < lowest - slack) or np.any(upper > highest + slack):
+            found = f"reaching from {number_words(lower)} to {number_words(upper)} m"
+            box = f"{number_words(lowest)} to {number_words(highest)} m"
+            yield "shape", found, f"within {box}, the box, with which pulleys and clearances reckon"
+        if is_of_shape:
+            self.shape.inertia(self.mass, center)
+
 
 @settings
 class PlatformDamping:
@@ -122,7 +181,12 @@ class TensionBounds:
     """Tensions that the robot may hold."""
 
     lower: Annotated[float, In("N", ge=0.0), "Smallest tension."]
-    upper: Annotated[float, In("N", gt=0.0), "Largest tension."]
+    upper: Annotated[float, In("N", gt=0.0, le=1e9), "Largest tension."]
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Bounds with nothing between."""
+        if self.lower >= self.upper:
+            yield "", f"lower {self.lower:g}, upper {self.upper:g}", "lower < upper"
 
 
 @settings
@@ -130,10 +194,10 @@ class Cable:
     """One cable: where it leaves the frame and where it holds the platform."""
 
     name: Annotated[Name, "Name, once in a robot."]
-    exit_point: Annotated[np.ndarray, In("m", 3), "Exit point A in W."]
-    anchor_point: Annotated[np.ndarray, In("m", 3), "Anchor point B in P."]
+    exit_point: Annotated[Point, "Exit point A in W."]
+    anchor_point: Annotated[Point, "Anchor point B in P."]
     swivel_axis: Annotated[
-        np.ndarray | None, In("-", 3), "Swivel axis of its pulley; null: that of `pulley`."
+        Direction | None, "Swivel axis of its pulley; null: that of `pulley`."
     ] = None
     pulley_radius: Annotated[
         float | None, In("m", ge=0.0), "Radius of the groove of its pulley; null: that of `pulley`."
@@ -146,8 +210,7 @@ class Cable:
         "Name of its winch; cables with the same one are wound on one. Null: one of its own.",
     ] = None
     anchor_swivel_axis: Annotated[
-        np.ndarray | None,
-        In("-", 3),
+        Direction | None,
         "Swivel axis in P of its pulley at the platform; null: that of `platform_pulley`.",
     ] = None
     anchor_pulley_radius: Annotated[
@@ -185,6 +248,18 @@ class CameraMount:
     parent: Annotated[str, OneOf(("platform", "world")), "What carries it."] = "platform"
     pose: Annotated[Pose, "Pose of the camera frame C in the parent, z forward, y down."]
 
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Cameras of no catalogue, and wrong files."""
+        from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names
+
+        if self.model.lower().endswith(CAMERA_SUFFIXES):
+            from cdpr_drake.models.camera_catalogue import load_camera
+
+            load_camera(self.model)
+        elif self.model not in camera_names():
+            names = ", ".join(camera_names())
+            yield "model", self.model, f"one of {names}, or the path of a camera file"
+
 
 @settings(repr=False)
 class Robot(Summarized):
@@ -199,8 +274,7 @@ class Robot(Summarized):
         "1R2T; of a beam 2R3T; of a body in space 3R3T.",
     ] = "3R3T"
     axis: Annotated[
-        np.ndarray | None,
-        In("-", 3),
+        Direction | None,
         "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the "
         "plane in W, of 2R3T that of the beam in P, of any length; null: z. Line and "
         "plane go through the home position.",
@@ -210,10 +284,12 @@ class Robot(Summarized):
         In("m"),
         "Height of Po in W for a robot in a horizontal plane; null otherwise.",
     ] = None
-    gravity: Annotated[float, In("m/s^2", ge=0.0), "Acceleration along `gravity_direction`."] = 9.81
-    gravity_direction: Annotated[
-        np.ndarray, In("-", 3), "Where gravity points in W, of any length."
-    ] = values(0.0, 0.0, -1.0)
+    gravity: Annotated[
+        float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
+    ] = 9.81
+    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+        0.0, 0.0, -1.0
+    )
     platform: Annotated[Platform, "The moving platform."]
     cable: Annotated[
         CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
@@ -245,6 +321,10 @@ class Robot(Summarized):
         "What tension sensors read while the cables are slack; null: zero.",
     ] = None
     assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What no robot is."""
+        yield from robot_refusals(self)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -397,9 +477,7 @@ class Robot(Summarized):
 
     def box_center(self) -> Array:
         """Middle of the platform's box in P, shape (3,) [m]."""
-        if self.platform.box_center is None:
-            return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
-        return np.asarray(self.platform.box_center, float)
+        return self.platform.middle()
 
     def drum(self) -> "Drum":
         """Drums and gears of the winches, blocks and tackles included."""

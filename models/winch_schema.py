@@ -1,11 +1,12 @@
 """The schema of the winches in a robot file."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.declarations import In, filled, settings
+from cdpr_drake.schema.declarations import In, Refusal, Scope, filled, settings
 
 if TYPE_CHECKING:  # statics need no winches
     from cdpr_drake.winches.drum import Drum
@@ -30,6 +31,11 @@ class Friction:
         "Time in which a motor settles once friction can hold it; steps up to twice this "
         "are stable.",
     ] = 0.001
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Static friction below Coulomb's."""
+        if self.static < self.coulomb:
+            yield "static", f"{self.static:g}", f"at least coulomb = {self.coulomb:g} [N m]"
 
     def law(self) -> "FrictionLaw":
         """The same for the pure functions."""

@@ -21,8 +21,8 @@ from typing import Any
 from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.models.camera_files import CAMERA_SUFFIXES
-from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES
 from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.mechanism_schema import MODEL_SUFFIXES
 from cdpr_drake.models.robot_copies import portable_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot

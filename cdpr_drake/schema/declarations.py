@@ -17,13 +17,17 @@ import math
 import re
 import types
 import typing
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable, Iterator
+from pathlib import Path
 from typing import Annotated, Any, dataclass_transform, get_args, get_origin
 
 import numpy as np
 
 SMALLEST, LARGEST = 1e-100, 1e30
 """Sizes of numbers but zero in any unit; squares and cubes of others are no floats any more."""
+
+LONGEST = 1e4
+"""Of frames, platforms and points [m]; cables of kilometres are what has been built."""
 
 FASTEST = 1e5
 """Largest rate of images, control steps and rows of a log [Hz]; nothing here is sampled faster."""
@@ -99,7 +103,7 @@ class Rule:
         return self.core(kind)
 
 
-@dataclasses.dataclass(init=False, frozen=True)
+@dataclasses.dataclass(init=False, frozen=True, eq=False)
 class In(Rule):
     """Numbers in a unit and within bounds; with a shape an array, None: any length but zero.
 
@@ -108,24 +112,32 @@ class In(Rule):
         shape: Of the array; () for one number.
         bounds: Of each number, by `gt`, `ge`, `lt`, `le`.
         single: Whether one number counts as an array of it.
+        direction: Whether not all of an array may be zero.
     """
 
     unit: str
     shape: tuple[int | None, ...]
     bounds: dict[str, float]
     single: bool
+    direction: bool
 
     def __init__(
-        self, unit: str = "", *shape: int | None, single: bool = False, **bounds: float
+        self,
+        unit: str = "",
+        *shape: int | None,
+        single: bool = False,
+        direction: bool = False,
+        **bounds: float,
     ) -> None:
         """As the attributes say."""
-        vars(self).update(unit=unit, shape=shape, bounds=bounds, single=single)
+        vars(self).update(unit=unit, shape=shape, bounds=bounds, single=single, direction=direction)
 
     def words(self, kind: Any, found: str = "") -> str:
         """See Rule; a number of a size without sense adds words."""
         words = "a whole number" if kind is int else "a number"
         if self.shape:
             words = " x ".join("n" if n is None else str(n) for n in self.shape) + " numbers"
+            words += ", not all zero" * self.direction
         signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
         bounds = " and ".join(f"{signs[sign]} {value:g}" for sign, value in self.bounds.items())
         words = " ".join(filter(None, (words, bounds, self.unit and f"[{self.unit}]")))
@@ -144,7 +156,13 @@ class In(Rule):
             schema = core_schema.no_info_before_validator_function(self._listed(n), rows)
         if not self.shape:
             return schema
-        return core_schema.no_info_after_validator_function(_array, schema)
+        return core_schema.no_info_after_validator_function(self._array, schema)
+
+    def _array(self, rows: list[Any]) -> np.ndarray:
+        made = np.array(rows, float)
+        if self.direction and not made.any():
+            raise ValueError
+        return made
 
     def _listed(self, length: int | None) -> Callable[[Any], Any]:
         """Refuses what is no list of a length, before its items are looked at."""
@@ -194,11 +212,7 @@ def _is_without_sense(words: str) -> bool:
     return math.isfinite(value) and not _has_sense(value)
 
 
-def _array(rows: list[Any]) -> np.ndarray:
-    return np.array(rows, float)
-
-
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class OneOf(Rule):
     """A word of a collection; a table in its place counts with what it has later."""
 
@@ -270,6 +284,12 @@ class _SwitchRule(Rule):
     def json(self, kind: Any) -> dict[str, Any]:
         return {"type": "boolean"}
 
+
+Direction = Annotated[np.ndarray, In("-", 3, direction=True)]
+"""A vector of any length but zero."""
+
+Point = Annotated[np.ndarray, In("m", 3, ge=-LONGEST, le=LONGEST)]
+"""A point in space."""
 
 Switch = Annotated[bool, _SwitchRule()]
 """True or false."""
@@ -383,3 +403,39 @@ def _setting(field: dataclasses.Field[Any], hint: Any) -> Setting:
     rule = next((note for note in notes if isinstance(note, Rule)), None)
     doc = next((note for note in notes if isinstance(note, str)), "")
     return Setting(field.name, doc, kind, rule, many, nullable, field)
+
+
+Refusal = tuple[str, object, str]
+"""A key within a section, or empty; what was found there, in words; and what is accepted."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scope:
+    """What is round a section, for its `refusals`.
+
+    A class of settings may have a method `refusals(scope)` that yields what no single field can
+    tell: a `Refusal` for each thing that its fields together, or with the scope, cannot be.
+
+    Attributes:
+        path: The file.
+        whole: The settings of the whole file.
+        robot: The robot of a scenario.
+    """
+
+    path: Path
+    whole: Any
+    robot: Any = None
+
+
+def repeated(names: Iterable[str], key: str) -> Iterator[Refusal]:
+    """Refuses names that come twice; `key` has {} for their place in a list."""
+    seen: set[str] = set()
+    for k, name in enumerate(names):
+        if name in seen:
+            yield key.format(k), f"{name} twice", "each name once"
+        seen.add(name)
+
+
+def number_words(values: Iterable[float]) -> str:
+    """Numbers as "(1, 2, 3)", for messages."""
+    return "(" + ", ".join(f"{value:g}" for value in values) + ")"

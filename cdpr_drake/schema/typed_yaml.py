@@ -1,13 +1,15 @@
 """Reads YAML files into settings, and says every problem with file, line and key.
 
-PyYAML knows lines, pydantic checks values, and `settings` says in words what they may be.
+PyYAML knows lines, pydantic checks values, their rules say in words what they may be, and sections
+refuse what no single field can tell.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -16,7 +18,7 @@ import numpy as np
 import yaml
 
 from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
-from cdpr_drake.schema.declarations import Setting, settings_of
+from cdpr_drake.schema.declarations import Scope, Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (
     YamlTextError,
@@ -44,6 +46,7 @@ def load_typed(
     *,
     error: type[DataFileError] = DataFileError,
     overrides: Sequence[str] = (),
+    scope: Callable[[T], Scope] | None = None,
 ) -> T:
     """Reads a file into settings.
 
@@ -52,11 +55,13 @@ def load_typed(
         path: YAML file.
         error: Class of the error to raise.
         overrides: Items "key.subkey=value" that replace what the file says; the value is YAML.
+        scope: Says what is round the settings once they are read, and may complete them; None:
+            nothing is, and their `refusals` are not asked.
 
     Raises:
         error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
-            shape, is not finite or lies outside the accepted range. It has every such problem of
-            the file and the overrides.
+            shape, is not finite or lies outside the accepted range; or sections refuse what they
+            say together. It has every such problem of the file and the overrides.
     """
     try:
         large = too_many_bytes(path)
@@ -65,7 +70,7 @@ def load_typed(
         content = input_text(path)
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {why_not_read(problem)}") from problem
-    return parse_typed(schema, content, path, error=error, overrides=overrides)
+    return parse_typed(schema, content, path, error=error, overrides=overrides, scope=scope)
 
 
 def parse_typed(
@@ -75,8 +80,23 @@ def parse_typed(
     *,
     error: type[DataFileError] = DataFileError,
     overrides: Sequence[str] = (),
+    scope: Callable[[T], Scope] | None = None,
+    lines: bool = True,
 ) -> T:
-    """As `load_typed`, of YAML that is there already; `path` is the file that messages name."""
+    """As `load_typed`, of YAML that is there already.
+
+    Args:
+        schema: As for `load_typed`.
+        content: The YAML.
+        path: The file that messages name.
+        error: As for `load_typed`.
+        overrides: As for `load_typed`.
+        scope: As for `load_typed`.
+        lines: Whether the YAML is what stands in that file, so that messages name its lines.
+
+    Raises:
+        error: As `load_typed`.
+    """
     known = settings_of(schema)
     try:
         root = _nodes(content)
@@ -87,7 +107,7 @@ def parse_typed(
     elsewhere = other_kind([str(key.value) for key, _ in root.value], known)
     if elsewhere:
         raise error(f"{path}: {elsewhere}")
-    problems = _Problems(error, path, root)
+    problems = _Problems(error, path, root if lines else None)
     data = _words(root, problems, ())
     problems.data, problems.schema = data, schema
     for item in overrides:
@@ -99,7 +119,21 @@ def parse_typed(
     except ValidationError as problem:
         problems.add_all(problem.errors(include_url=False, include_context=False))
     problems.raise_any()
+    if scope is not None:
+        problems.add_refusals(made, scope(made))
+        problems.raise_any()
     return made
+
+
+def refuse(settings: Any, scope: Scope, error: type[DataFileError] = DataFileError) -> None:
+    """Raises what settings refuse that were made by code, or were changed.
+
+    Raises:
+        error: With every refusal.
+    """
+    problems = _Problems(error, scope.path, None)
+    problems.add_refusals(settings, scope)
+    problems.raise_any()
 
 
 @lru_cache(32)
@@ -188,7 +222,7 @@ def _words(node: yaml.Node, problems: _Problems, place: Place) -> Any:
     for key, child in node.value:
         name = key.value if isinstance(key, yaml.ScalarNode) else shown(key)
         if name in data:
-            problems.add((*place, name), "found twice; accepted: once", key)
+            problems.add((*place, name), "found twice; accepted: once", at_key=True)
         data[name] = _words(child, problems, (*place, name))
     return data
 
@@ -235,7 +269,7 @@ def _override(schema: type, data: dict[str, Any], item: str, problems: _Problems
 class _Problems:
     """What a file is refused for, in the order of its lines."""
 
-    def __init__(self, error: type[DataFileError], path: Path, root: yaml.Node) -> None:
+    def __init__(self, error: type[DataFileError], path: Path, root: yaml.Node | None) -> None:
         self.schema: type = object
         self.data: Any = None
         self.origins: dict[Place, str] = {}
@@ -243,19 +277,22 @@ class _Problems:
         self._said: list[tuple[float, str]] = []
 
     def note(self, words: str) -> None:
-        """Of an override that is none."""
+        """Of an override that is none, or of another file."""
         self._said.append((-1, words))
 
-    def add(self, place: Place, words: str, node: yaml.Node) -> None:
-        """What is wrong at a place, which begins at a node of the file or of an override."""
+    def add(self, place: Place, words: str, at_key: bool = False) -> None:
+        """What is wrong with a value, or at its key."""
         key = key_of(place)
         for origin in (place[:n] for n in range(len(place), 0, -1)):
             if origin in self.origins:
                 inner = "" if origin == place else f"{key}: "
                 self._said.append((math.inf, f"{self.origins[origin]}: {inner}{words}"))
                 return
-        line = node.start_mark.line + 1
-        self._said.append((line, f"{self._path}:{line}: {key + ': ' if key else ''}{words}"))
+        line = 0
+        if self._root is not None:
+            line = _nodes_at(self._root, place)[0 if at_key else 1].start_mark.line + 1
+        where = f"{self._path}:{line}" if line else str(self._path)
+        self._said.append((line, f"{where}: {key + ': ' if key else ''}{words}"))
 
     def add_all(self, errors: Iterable[Any]) -> None:
         """What pydantic found."""
@@ -270,8 +307,22 @@ class _Problems:
             place = error["loc"]
             if error["type"] == "missing" and place in meant:
                 continue
-            key, node = _node_at(self._root, place)
-            self.add(place, self._words(error), key if error["type"] in _UNKNOWN else node)
+            self.add(place, self._words(error), error["type"] in _UNKNOWN)
+
+    def add_refusals(self, settings: Any, scope: Scope) -> None:
+        """What sections refuse."""
+        for place, section in _sections(settings, ()):
+            try:
+                for key, found, accepted in getattr(section, "refusals", _none)(scope):
+                    parts = re.findall(r"[^.\[\]]+", key)
+                    at = (*place, *(int(part) if part.isdecimal() else part for part in parts))
+                    self.add(at, f"found {found}; accepted: {accepted}")
+            except self._error as problem:  # of a file that a section names
+                for words in problem.problems:
+                    self.note(words)
+            except Exception:  # may follow from what is said already
+                if not self._said:
+                    raise
 
     def _words(self, error: Any) -> str:
         section, setting = _owner(self.schema, error["loc"])
@@ -300,6 +351,25 @@ class _Problems:
         problems.raise_any()
 
 
+def _none(scope: Scope) -> tuple[()]:
+    return ()
+
+
+def _sections(section: Any, place: Place) -> Iterator[tuple[Place, Any]]:
+    """A section and all within, each with its place in the file."""
+    yield place, section
+    for field in dataclasses.fields(section):
+        value, at = getattr(section, field.name), (*place, field.name)
+        inside: dict[Place, Any] = {at: value}
+        if isinstance(value, list):
+            inside = {(*at, k): item for k, item in enumerate(value)}
+        elif isinstance(value, dict):
+            inside = {(*at, name): item for name, item in value.items()}
+        for where, item in inside.items():
+            if dataclasses.is_dataclass(item):
+                yield from _sections(item, where)
+
+
 def _owner(schema: type, place: Place) -> tuple[type, Setting | None]:
     """The class of the section that a place lies in, and its setting; None: there is no such."""
     setting = settings_of(schema).get(str(place[0]))
@@ -309,7 +379,7 @@ def _owner(schema: type, place: Place) -> tuple[type, Setting | None]:
     return schema, setting
 
 
-def _node_at(root: yaml.Node, place: Place) -> tuple[yaml.Node, yaml.Node]:
+def _nodes_at(root: yaml.Node, place: Place) -> tuple[yaml.Node, yaml.Node]:
     """The nodes of the key and of the value of a place, or of what is nearest round it."""
     key = node = root
     for part in place:

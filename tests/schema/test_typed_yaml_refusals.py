@@ -206,8 +206,8 @@ def test_all_problems_of_a_file_are_said_at_once(load, tmp_path):
         ":2: share: found 7",
         ":3: sizes: unknown key",
         ":4: size[2]: found x",
-        ":5: parts[1].at: found [1, 2]",
         ":5: parts[1].label: missing",
+        ":5: parts[1].at: found [1, 2]",
         "overrides drum.turns: found 0",
     ]
     assert str(caught.value).splitlines() == list(caught.value.problems)
