@@ -4,6 +4,7 @@ Files of your own, as `cdpr calibrate-camera` writes them, have the same fields,
 calibrated; `camera_info` files of ROS and files of OpenCV's FileStorage are read too.
 """
 
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,8 +15,8 @@ import numpy as np
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_calibrations import read_calibration
 from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
-from cdpr_drake.schema.declarations import In, OneOf, Text, settings, values
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, Text, settings, values
+from cdpr_drake.schema.typed_yaml import closest, load_typed, refuse
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, FARTHEST, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -47,38 +48,37 @@ class Distortion:
         names = COEFFICIENTS[self.kind]
         return LensDistortion(self.kind, tuple(float(getattr(self, name)) for name in names))
 
-    def problem(self) -> str:
-        """Words for a coefficient that its kind does not have; empty where all fit."""
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Coefficients that its kind does not have."""
         known = COEFFICIENTS.get(self.kind, ())
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name != "kind" and field.name not in known and value != 0.0:
                 has = f"0, or {', '.join(known)}" if known else "0, or another kind"
-                return f"{field.name}: found {value:g} with kind {self.kind}; accepted: {has}"
-        return ""
+                yield field.name, f"{value:g} with kind {self.kind}", has
 
 
-def fold_problem(pinhole: Pinhole) -> str:
-    """Words for a lens whose image folds over, or that sees more than this package computes with,
-    within the picture; empty where neither is so."""
+def fold_refusals(pinhole: Pinhole, key: str) -> Iterator[Refusal]:
+    """A lens whose image folds over, or that sees more than this package computes with, within the
+    picture; `key` is that of the lens."""
     share = pinhole.blind_share()
     if share == 0.0:
-        return ""
+        return
     assert pinhole.distortion is not None
     angle = float(np.degrees(np.arctan(pinhole.distortion.valid_radius)))
+    lens, size = f"a {pinhole.distortion.kind} lens", f"{pinhole.width} x {pinhole.height} pixels"
     if pinhole.distortion.valid_radius == FARTHEST:
-        return (
-            f"found a {pinhole.distortion.kind} lens that sees more than {angle:.1f} deg from the "
-            f"axis at {100.0 * share:.0f} % of the rim of its {pinhole.width} x {pinhole.height} "
-            "pixels, beyond what this package computes with; accepted: less than a half space, as "
-            "of an image that was cropped"
+        found = (
+            f"{lens} that sees more than {angle:.1f} deg from the axis at {100.0 * share:.0f} % of "
+            f"the rim of its {size}, beyond what this package computes with"
         )
-    return (
-        f"found a {pinhole.distortion.kind} lens whose image folds over {angle:.1f} deg from the "
-        f"axis, within the image of {pinhole.width} x {pinhole.height} pixels, of whose rim it "
-        f"leaves {100.0 * share:.0f} % without a direction; accepted: coefficients that hold up to "
-        "the corners"
-    )
+        yield key, found, "less than a half space, as of an image that was cropped"
+    else:
+        found = (
+            f"{lens} whose image folds over {angle:.1f} deg from the axis, within the image of "
+            f"{size}, of whose rim it leaves {100.0 * share:.0f} % without a direction"
+        )
+        yield key, found, "coefficients that hold up to the corners"
 
 
 @settings
@@ -108,6 +108,17 @@ class Camera:
         Distortion | None,
         "What the lens does to the image of the pinhole that the view angles mean; null: nothing.",
     ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A principal point outside of the image, and lenses that fold it over."""
+        if self.principal_point is not None:
+            u, v = self.principal_point
+            if not (-0.5 < u < self.width - 0.5 and -0.5 < v < self.height - 0.5):
+                accepted = f"a point in the image of {self.width} x {self.height} pixels"
+                yield "principal_point", f"[{u:g}, {v:g}]", accepted
+                return
+        if self.distortion is None or not any(self.distortion.refusals(scope)):
+            yield from fold_refusals(self.pinhole(self.width, self.height), "distortion")
 
     def pinhole(self, width: int, height: int) -> Pinhole:
         """The pinhole camera with these view angles and an image of width x height [px].
@@ -196,22 +207,13 @@ def load_camera_file(path: Path) -> Camera:
     """
     calibration = None if path.parent == CAMERA_FOLDER else read_calibration(path)
     if calibration is None:
-        camera = load_typed(Camera, path, error=RobotFileError)
+        camera = load_typed(
+            Camera, path, error=RobotFileError, scope=lambda camera: Scope(camera, path)
+        )
     else:
         lens = calibration.pop("distortion")
         camera = Camera(**calibration, distortion=None if lens is None else Distortion(**lens))
-    if camera.principal_point is not None:
-        u, v = camera.principal_point
-        if not (-0.5 < u < camera.width - 0.5 and -0.5 < v < camera.height - 0.5):
-            raise RobotFileError(
-                f"{path}: principal_point: found [{u:g}, {v:g}]; accepted: a point in the image of "
-                f"{camera.width} x {camera.height} pixels"
-            )
-    if camera.distortion is not None and camera.distortion.problem():
-        raise RobotFileError(f"{path}: distortion.{camera.distortion.problem()}")
-    fold = fold_problem(camera.pinhole(camera.width, camera.height))
-    if fold:
-        raise RobotFileError(f"{path}: distortion: {fold}")
+        refuse(camera, "", path=path, error=RobotFileError)
     return camera
 
 

@@ -142,7 +142,7 @@ def _scope(mechanism: Mechanism, path: Path) -> Scope:
             mechanism.mechanism = known.ResolveUrl(mechanism.mechanism)
     elif input_there(here / mechanism.mechanism):
         mechanism.mechanism = str(here / mechanism.mechanism)
-    return Scope(path, mechanism)
+    return Scope(mechanism, path)
 
 
 def _checked_in_plant(mechanism: Mechanism, path: Path) -> Mechanism:

@@ -244,7 +244,7 @@ def _scope(robot: Robot, path: Path, rails: dict[str, float]) -> Scope:
                 f"{path}: {MARK}{name}: found no rail of that cable; accepted: {accepted}"
             )
         on_rails[name].at = at
-    return Scope(path, robot)
+    return Scope(robot, path)
 
 
 def point_notes(robot: Robot) -> list[str]:

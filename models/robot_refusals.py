@@ -60,7 +60,7 @@ def robot_refusals(robot: Robot) -> Iterator[Refusal]:
         try:
             check_model(robot.cable_model, cables)
         except CableModelError as problem:
-            yield "cable_model", f"{robot.cable_model}: {problem}", "a model of these cables"
+            yield "cable_model", str(problem), ""
 
 
 def _motion(robot: Robot) -> Iterator[Refusal]:

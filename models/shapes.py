@@ -72,11 +72,11 @@ class PlatformShape:
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """What its kind needs and is not there."""
-        missing = self.missing()
+        missing, folder = self.missing(), (scope.path or Path()).parent
         if missing:
             yield missing, "null", f"a value, for the kind {self.kind}"
-        elif self.kind == MESH and mesh_path(str(self.file), scope.path.parent) is None:
-            yield "file", self.file, f"an .obj or .gltf file, from {scope.path.parent}"
+        elif self.kind == MESH and mesh_path(str(self.file), folder) is None:
+            yield "file", self.file, f"an .obj or .gltf file, from {folder}"
 
     def pose(self, middle: Array) -> RigidTransform:
         """X_PS of the shape [m]; `middle` is that of the platform's box."""

@@ -18,10 +18,9 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.declarations import In, Switch, Text, filled, settings, values
+from cdpr_drake.schema.declarations import In, Scope, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
-from cdpr_drake.systems.worlds.checks import motion_problems
-from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion
+from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion, way_back_refusals
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 from cdpr_drake.trajectories.sampled_motion import read_motion, sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
@@ -161,7 +160,7 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
     """
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
-    content = load_typed(ObstacleFile, path)
+    content = load_typed(ObstacleFile, path, scope=lambda content: Scope(content, path))
     if not any((content.boxes, content.spheres, content.capsules, content.meshes, content.robots)):
         raise DataFileError(
             f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes, robots"
@@ -175,8 +174,8 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
         if motion is None:
             solids.append(shape.moved(X_WS))
             return
-        for problem in motion_problems(X_WS, motion, f"{key}.motion"):
-            raise DataFileError(f"{path}: {problem}")
+        for inner, found, accepted in way_back_refusals(X_WS, motion):
+            raise DataFileError(f"{path}: {key}.{inner}: found {found}; accepted: {accepted}")
         moving.append(MovingShape(shape, body_motion(X_WS, motion), key))
 
     for k, box in enumerate(content.boxes):

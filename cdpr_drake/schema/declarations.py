@@ -406,7 +406,8 @@ def _setting(field: dataclasses.Field[Any], hint: Any) -> Setting:
 
 
 Refusal = tuple[str, object, str]
-"""A key within a section, or empty; what was found there, in words; and what is accepted."""
+"""A key within a section, or empty; what was found there, in words; and what is accepted, or empty
+where the words tell that, too."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -417,14 +418,22 @@ class Scope:
     tell: a `Refusal` for each thing that its fields together, or with the scope, cannot be.
 
     Attributes:
-        path: The file.
         whole: The settings of the whole file.
-        robot: The robot of a scenario.
+        path: The file; None: code made them.
+        robot: The robot or mechanism of a scenario.
+        more: Functions that yield what else the whole is refused for.
     """
 
-    path: Path
     whole: Any
+    path: Path | None = None
     robot: Any = None
+    more: tuple[Callable[[Scope], Iterator[Refusal]], ...] = ()
+
+
+def told(problem: Exception, key: str) -> Refusal:
+    """A refusal in the words of an error, which may begin with a key of their own."""
+    own = re.match(r"([a-z_][a-z_0-9.\[\]]*): (found .*)", str(problem))
+    return (own[1], own[2], "") if own else (key, str(problem), "")
 
 
 def repeated(names: Iterable[str], key: str) -> Iterator[Refusal]:

@@ -125,14 +125,28 @@ def parse_typed(
     return made
 
 
-def refuse(settings: Any, scope: Scope, error: type[DataFileError] = DataFileError) -> None:
-    """Raises what settings refuse that were made by code, or were changed.
+def refuse(
+    settings: Any,
+    key: str = "",
+    *,
+    path: Path | None = None,
+    robot: Any = None,
+    error: type[DataFileError] = DataFileError,
+) -> None:
+    """Raises what settings refuse that were made by code, or from a file of another tool.
+
+    Args:
+        settings: The settings.
+        key: The key of a section in a file, for the message.
+        path: File for the message.
+        robot: The robot that a section is for, if it asks for one.
+        error: Class of the error to raise.
 
     Raises:
         error: With every refusal.
     """
-    problems = _Problems(error, scope.path, None)
-    problems.add_refusals(settings, scope)
+    problems = _Problems(error, path, None)
+    problems.add_refusals(settings, Scope(settings, path, robot), (key,) if key else ())
     problems.raise_any()
 
 
@@ -269,7 +283,9 @@ def _override(schema: type, data: dict[str, Any], item: str, problems: _Problems
 class _Problems:
     """What a file is refused for, in the order of its lines."""
 
-    def __init__(self, error: type[DataFileError], path: Path, root: yaml.Node | None) -> None:
+    def __init__(
+        self, error: type[DataFileError], path: Path | None, root: yaml.Node | None
+    ) -> None:
         self.schema: type = object
         self.data: Any = None
         self.origins: dict[Place, str] = {}
@@ -291,8 +307,8 @@ class _Problems:
         line = 0
         if self._root is not None:
             line = _nodes_at(self._root, place)[0 if at_key else 1].start_mark.line + 1
-        where = f"{self._path}:{line}" if line else str(self._path)
-        self._said.append((line, f"{where}: {key + ': ' if key else ''}{words}"))
+        file = "" if self._path is None else f"{self._path}:{line}: " if line else f"{self._path}: "
+        self._said.append((line, f"{file}{key + ': ' if key else ''}{words}"))
 
     def add_all(self, errors: Iterable[Any]) -> None:
         """What pydantic found."""
@@ -309,14 +325,17 @@ class _Problems:
                 continue
             self.add(place, self._words(error), error["type"] in _UNKNOWN)
 
-    def add_refusals(self, settings: Any, scope: Scope) -> None:
+    def add_refusals(self, settings: Any, scope: Scope, within: Place = ()) -> None:
         """What sections refuse."""
-        for place, section in _sections(settings, ()):
+        asked = [(at, each.refusals) for at, each in _sections(settings, within)
+                 if hasattr(each, "refusals")]  # fmt: skip
+        asked += [(within, more) for more in scope.more]
+        for place, refusals in asked:
             try:
-                for key, found, accepted in getattr(section, "refusals", _none)(scope):
+                for key, found, accepted in refusals(scope):
                     parts = re.findall(r"[^.\[\]]+", key)
                     at = (*place, *(int(part) if part.isdecimal() else part for part in parts))
-                    self.add(at, f"found {found}; accepted: {accepted}")
+                    self.add(at, f"found {found}; accepted: {accepted}" if accepted else str(found))
             except self._error as problem:  # of a file that a section names
                 for words in problem.problems:
                     self.note(words)
@@ -349,10 +368,6 @@ class _Problems:
         for _, words in sorted(self._said, key=lambda said: said[0]):
             problems.add(words)
         problems.raise_any()
-
-
-def _none(scope: Scope) -> tuple[()]:
-    return ()
 
 
 def _sections(section: Any, place: Place) -> Iterator[tuple[Place, Any]]:

@@ -1,13 +1,13 @@
 """Scenario section `camera`: its settings, and checks of them that need more than one field."""
 
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Annotated
 
-from cdpr_drake.errors import RobotFileError, ScenarioError
-from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_problem, load_camera
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_refusals, load_camera
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, settings
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Refusal, Scope, Text, settings, told
 from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.vision.image_flaws import ImageFlaws
 from cdpr_drake.vision.pinhole import Pinhole
@@ -103,40 +103,37 @@ class CameraSettings:
         "Two joints that turn it and keep the target in view; null: it is fixed.",
     ] = None
 
-
-def check_camera(camera: CameraSettings, path: Path) -> None:
-    """Refuses what a camera of its kind cannot do.
-
-    Args:
-        camera: The settings.
-        path: Of the scenario's file, for the message.
-
-    Raises:
-        ScenarioError: A projected camera shall look at a region, or a rendered one zoom.
-    """
-    if camera.region == REGION and camera.kind != RENDERED:
-        raise ScenarioError(
-            f"{path}: camera.region: found {REGION} with camera.kind {camera.kind}, which draws no "
-            f"image; accepted: whole, or camera.kind {RENDERED}"
-        )
-    if camera.flaws is not None and (camera.kind != RENDERED or camera.region != WHOLE):
-        raise ScenarioError(
-            f"{path}: camera.flaws: found a section with camera.kind {camera.kind} and "
-            f"camera.region {camera.region}; accepted: null, or {RENDERED} and {WHOLE}"
-        )
-    if camera.flaws is not None:
-        taken = camera.flaws.exposure + camera.flaws.readout
-        if taken > 1.0 / camera.rate:
-            raise ScenarioError(
-                f"{path}: camera.flaws: found exposure and readout of {taken:g} s; accepted: at "
-                f"most {1.0 / camera.rate:g} s, the time of an image at camera.rate"
-            )
-    if camera.focus_zoom > 0.0 and camera.kind != PROJECTED:
-        raise ScenarioError(
-            f"{path}: camera.focus_zoom: found {camera.focus_zoom:g} with camera.kind "
-            f"{camera.kind}, whose focal length does not change; accepted: 0, or camera.kind "
-            f"{PROJECTED}"
-        )
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What a camera of its kind cannot do, and one that is none."""
+        if self.region == REGION and self.kind != RENDERED:
+            found = f"{REGION} with camera.kind {self.kind}, which draws no image"
+            yield "region", found, f"whole, or camera.kind {RENDERED}"
+        if self.flaws is not None and (self.kind != RENDERED or self.region != WHOLE):
+            found = f"a section with camera.kind {self.kind} and camera.region {self.region}"
+            yield "flaws", found, f"null, or {RENDERED} and {WHOLE}"
+        if self.flaws is not None:
+            taken, image = self.flaws.exposure + self.flaws.readout, 1.0 / self.rate
+            if taken > image:
+                found = f"exposure and readout of {taken:g} s"
+                yield "flaws", found, f"at most {image:g} s, the time of an image at camera.rate"
+        if self.focus_zoom > 0.0 and self.kind != PROJECTED:
+            found = f"{self.focus_zoom:g} with camera.kind {self.kind}, which cannot zoom"
+            yield "focus_zoom", found, f"0, or camera.kind {PROJECTED}"
+        if self.fault is not None and self.kind != PROJECTED:
+            found = f"a fault with camera.kind {self.kind}"
+            yield "fault", found, f"null, or camera.kind {PROJECTED}"
+        moves = self.flaws is not None and self.flaws.flaws().moves
+        if self.pan_tilt is not None and moves:
+            found = "images that take time with camera.pan_tilt"
+            yield "flaws", found, "exposure and readout 0"
+        if self.mount not in [mount.name for mount in scope.robot.cameras] or (
+            self.distortion is not None and any(self.distortion.refusals(scope))
+        ):
+            return
+        try:
+            yield from fold_refusals(servo_pinhole(self, scope.robot), "distortion")
+        except RobotFileError as problem:
+            yield told(problem, "model")
 
 
 def servo_pinhole(camera: CameraSettings, robot: Robot) -> Pinhole:
@@ -150,25 +147,3 @@ def servo_pinhole(camera: CameraSettings, robot: Robot) -> Pinhole:
     if camera.distortion is None:
         return pinhole
     return replace(pinhole, distortion=camera.distortion.lens())
-
-
-def check_lens(camera: CameraSettings, robot: Robot, path: Path) -> None:
-    """Refuses a camera that is none, and a lens that folds its image over.
-
-    Args:
-        camera: The settings, with a mounting that the robot has.
-        robot: The robot.
-        path: Of the scenario's file, for the message.
-
-    Raises:
-        ScenarioError: As said; names the field.
-    """
-    if camera.distortion is not None and camera.distortion.problem():
-        raise ScenarioError(f"{path}: camera.distortion.{camera.distortion.problem()}")
-    try:
-        pinhole = servo_pinhole(camera, robot)
-    except RobotFileError as problem:
-        raise ScenarioError(*problem.within(f"{path}: camera.model")) from problem
-    fold = fold_problem(pinhole)
-    if fold:
-        raise ScenarioError(f"{path}: camera.distortion: {fold}")

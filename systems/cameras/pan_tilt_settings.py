@@ -1,10 +1,19 @@
 """Scenario section `camera.pan_tilt`: two joints that turn the servo's camera."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
 
-from cdpr_drake.schema.declarations import FASTEST, In, settings, values
+from cdpr_drake.schema.declarations import (
+    FASTEST,
+    In,
+    Refusal,
+    Scope,
+    number_words,
+    settings,
+    values,
+)
 
 
 @settings
@@ -52,3 +61,17 @@ class CameraPanTilt:
     noise_deg: Annotated[
         float, In("deg", ge=0.0), "Standard deviation of a reading of an encoder."
     ] = 0.0
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits with nothing between, or beyond half a turn, and a start outside of them."""
+        lower, upper, start = self.lower_deg, self.upper_deg, self.start_deg
+        if np.any(lower > upper):
+            yield "lower_deg", f"{_pair(lower)}", f"at most upper_deg, {_pair(upper)}"
+        elif np.any(np.maximum(np.abs(lower), np.abs(upper)) > 180.0):
+            yield "", f"limits {_pair(lower)} and {_pair(upper)}", "-180 to 180 [deg]"
+        elif np.any(start < lower) or np.any(start > upper):
+            yield "start_deg", _pair(start), f"{_pair(lower)} to {_pair(upper)}"
+
+
+def _pair(angles: np.ndarray) -> str:
+    return f"{number_words(angles)} [deg]"

@@ -3,13 +3,22 @@
 `TARGETS` is the table of the kinds that a scenario can name; a new one is one entry of it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Annotated, Protocol
 
 import numpy as np
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    In,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    filled,
+    settings,
+    values,
+)
 from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 from cdpr_drake.trajectories.pose_trajectory import MovingPose, SteadyMotion, WaypointMotion
 from cdpr_drake.vision.apriltags import TAG_COUNT, TagBundle, TagTarget
@@ -83,6 +92,13 @@ class MobileRobotSettings:
     ] = 0.1
     lap_time: Annotated[float, In("s", gt=0.0), "Time of a lap."] = 16.0
 
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Corners that are wider than the track."""
+        most = 0.5 * min(self.length, self.width)
+        if self.corner_radius > most:
+            accepted = f"at most {most:g} [m], half the shorter side of the track"
+            yield "corner_radius", f"{self.corner_radius:g}", accepted
+
     def track(self) -> RoundedTrack:
         """The track."""
         return RoundedTrack(self.length, self.width, self.corner_radius)
@@ -107,6 +123,20 @@ class TargetMotion:
     mobile_robot: Annotated[
         MobileRobotSettings | None, "A mobile robot that carries it round; null: none."
     ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Times that do not grow, and several kinds of motion at once."""
+        times = [point.time for point in self.waypoints]
+        if times != sorted(set(times)):
+            yield "waypoints", f"the times {times}", "growing ones"
+        kinds = {
+            "waypoints": bool(times),
+            "a velocity": self.has_velocity(),
+            "a mobile_robot": self.mobile_robot is not None,
+        }
+        several = [words for words, there in kinds.items() if there]
+        if len(several) > 1:
+            yield "", " and ".join(several), "one of them"
 
     def moves(self) -> bool:
         """Whether it ever changes, also where the waypoints' times make no sense."""
@@ -143,6 +173,16 @@ class TargetSettings:
         "Pose of the object frame O in its carrier at time 0: x right, y up, z out of the pattern.",
     ]
     motion: Annotated[TargetMotion | None, "How it moves; null: it rests."] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A bundle without tags, or with one twice, and a motion of what the platform carries."""
+        ids = [tag.tag_id for tag in self.tags]
+        if self.kind == "tag_bundle" and (not ids or len(set(ids)) != len(ids)):
+            found = f"the identities {ids}" if ids else "none"
+            yield "tags", found, "at least one tag, each identity once"
+        if self.motion is not None and self.carrier == "platform":
+            found = "a motion of a target that the platform carries"
+            yield "motion", found, "null, or target.carrier=world"
 
     def target(self) -> Target:
         """The target itself."""

@@ -1,5 +1,6 @@
 """Scenario section `force_control` of dynamic control, and its block: laws that answer forces."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
@@ -34,9 +35,18 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    In,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    filled,
+    settings,
+    values,
+)
+from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -105,24 +115,16 @@ class ForceControl:
         "admittance that leaves the platform on the trajectory that gives way.",
     ] = False
 
-    def check(self) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            ScenarioError: Something is missing, or belongs to another kind; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What is missing or belongs to another kind, and robots that it is not for."""
         needs = {IMPEDANCE: ("stiffness", "damping"), ADMITTANCE: ("stiffness", "damping", "mass")}
         for name in ("stiffness", "damping", "mass"):
-            wanted = name in needs.get(self.kind, ())
-            if (getattr(self, name) is not None) != wanted:
-                found, accepted = ("none", "six numbers") if wanted else ("numbers", "null")
-                raise ScenarioError(
-                    f"force_control.{name}: found {found} with {self.kind}; accepted: {accepted}"
-                )
+            is_needed = name in needs.get(self.kind, ())
+            if (getattr(self, name) is not None) != is_needed:
+                found, accepted = ("none", "six numbers") if is_needed else ("numbers", "null")
+                yield name, f"{found} with {self.kind}", accepted
         if self.mass is not None and not np.all(self.mass > 0.0):
-            raise ScenarioError(
-                f"force_control.mass: found {np.min(self.mass):g}; accepted: above 0"
-            )
+            yield "mass", f"{np.min(self.mass):g}", "above 0"
         hybrid = self.kind == HYBRID
         for name, there in (
             ("axes", bool(self.axes)), ("force", self.force is not None),
@@ -130,9 +132,9 @@ class ForceControl:
         ):  # fmt: skip
             if there != hybrid:
                 found, accepted = ("none", "it") if hybrid else ("one", "none")
-                raise ScenarioError(
-                    f"force_control.{name}: found {found} with {self.kind}; accepted: {accepted}"
-                )
+                yield name, f"{found} with {self.kind}", accepted
+        if not scope.robot.motion_type().is_free:
+            yield "", f"a section for {scope.robot.name}, {scope.robot.motion}", "3R3T"
 
     def pressed(self) -> Array:
         """1 for axes of T that press, else 0, shape (6,)."""
@@ -141,21 +143,6 @@ class ForceControl:
     def observes(self) -> bool:
         """Whether a wrench is estimated."""
         return self.kind in (ADMITTANCE, HYBRID) or self.reject
-
-
-def check_force_control(settings: ForceControl | None, robot: Robot) -> None:
-    """Checks the section against a robot.
-
-    Raises:
-        ScenarioError: Something is not accepted; names it.
-    """
-    if settings is None:
-        return
-    settings.check()
-    if not robot.motion_type().is_free:
-        raise ScenarioError(
-            f"force_control: found a section for {robot.name}, {robot.motion}; accepted: 3R3T"
-        )
 
 
 class ForceTracking(PoseTracking):
@@ -198,7 +185,7 @@ class ForceTracking(PoseTracking):
         Raises:
             ScenarioError: The settings are not accepted.
         """
-        check_force_control(settings, in_plant.robot)
+        refuse(settings, "force_control", robot=in_plant.robot, error=ScenarioError)
         super().__init__(in_plant, trajectory, gains, dynamics)
         robot = in_plant.robot
         self._settings, self._gains, self._cables = settings, gains, cables

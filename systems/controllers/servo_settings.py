@@ -1,11 +1,21 @@
 """Scenario section `controller`: the visual servo."""
 
+from collections.abc import Iterator
 from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, filled, settings
+from cdpr_drake.schema.declarations import (
+    FASTEST,
+    In,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    filled,
+    settings,
+)
 from cdpr_drake.servoing.feature_plan import PROFILES
 from cdpr_drake.servoing.servo_law import FRAMES, GOALS, MODES
 from cdpr_drake.servoing.servo_task import INTERACTIONS
@@ -163,3 +173,9 @@ class ControllerSettings:
     switching: Annotated[
         SwitchSettings | None, "Settings of the scheme switching; null: their defaults."
     ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A gain that grows with the error."""
+        if self.lambda_infinity > self.lambda_0:
+            accepted = f"at most lambda_0 = {self.lambda_0:g} [1/s]"
+            yield "lambda_infinity", f"{self.lambda_infinity:g}", accepted

@@ -14,10 +14,9 @@ Every failure begins at a time and lasts. See `FAILURES` for what there is:
 A camera that goes dark is `camera.fault` of a scenario.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -29,9 +28,8 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.declarations import In, OneOf, Text, filled, settings
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, Text, filled, settings
 
 BROKEN, JAMMED, POWERLESS = FAULTS = ("broken", "jammed", "powerless")
 """Inputs and outputs of a robot block with `failures`: 1 for each cable that is broken, for each
@@ -78,6 +76,13 @@ class Equipment:
     sensors: tuple[str, ...] = ()
     per_cable: tuple[str, ...] = ("tension", "encoder")
 
+    @classmethod
+    def of(cls, scenario: Any, robot: Robot) -> "Equipment":
+        """That of a scenario's robot."""
+        sensors = scenario.sensors.sampled() if hasattr(scenario, "sensors") else ()
+        count = robot.winch_groups().count
+        return cls(len(robot.cables), count, scenario.winches.has_motors(), tuple(sensors))
+
     def knows(self, name: str, found: int | str | float) -> bool:
         """Whether there is what a field of a failure says."""
         if name == "sensor":
@@ -116,36 +121,22 @@ class Failure:
         Text | None, "Which sensor freezes or is late, as section sensors names it."
     ] = None
 
-    def check(self, where: str, has: Equipment) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            ScenarioError: Something is missing, belongs to another kind, or there is no such cable,
-                winch or sensor; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What is missing, belongs to another kind, or is not there."""
+        has = Equipment.of(scope.whole, scope.robot)
         for name in ("cable", "winch", "sensor", "delay"):
             found, mine = getattr(self, name), name in NEEDS[self.kind]
             if found is None and mine:
-                raise ScenarioError(
-                    f"{where}.{name}: found none with {self.kind}; accepted: {has.accepted(name)}"
-                )
-            if found is not None and not mine and name not in OPTIONAL.get(self.kind, ()):
-                raise ScenarioError(
-                    f"{where}.{name}: found {found} with {self.kind}; accepted: null"
-                )
-            if found is not None and not has.knows(name, found):
-                raise ScenarioError(
-                    f"{where}.{name}: found {found}; accepted: {has.accepted(name)}"
-                )
+                yield name, f"none with {self.kind}", has.accepted(name)
+            elif found is not None and not mine and name not in OPTIONAL.get(self.kind, ()):
+                yield name, f"{found} with {self.kind}", "null"
+            elif found is not None and not has.knows(name, found):
+                yield name, found, has.accepted(name)
         if self.kind == POWER and not has.motors:
-            raise ScenarioError(
-                f"{where}.kind: found {self.kind} with ideal winches, which have no motors; "
-                f"accepted: {BREAKS}, {JAMS}, {BRAKE}, or winches.kind motor"
-            )
+            found = f"{self.kind} with ideal winches, which have no motors"
+            yield "kind", found, f"{BREAKS}, {JAMS}, {BRAKE}, or winches.kind motor"
         if self.cable is not None and self.sensor not in (None, *has.per_cable):
-            raise ScenarioError(
-                f"{where}.cable: found {self.cable} with {self.sensor}; accepted: null"
-            )
+            yield "cable", f"{self.cable} with {self.sensor}", "null"
 
     def words(self, robot: Robot) -> str:
         """What fails, in words: the cable, or the winch by the cables on it."""
@@ -179,18 +170,6 @@ class FailureSettings:
 
     events: Annotated[list[Failure], "What fails, and when."] = filled(list)
 
-    def check(self, has: Equipment) -> None:
-        """Checks every failure of a scenario.
-
-        Raises:
-            ScenarioError: One is not accepted; names it.
-        """
-        problems = Problems(ScenarioError)
-        for k, event in enumerate(self.events):
-            with problems.collected():
-                event.check(f"failures.events[{k}]", has)
-        problems.raise_any()
-
     def flags(self, time: float, cables: int, winches: int) -> dict[str, Array]:
         """What has failed by a time [s], by the names of `FAULTS`."""
         out = {name: np.zeros(cables if name == BROKEN else winches) for name in FAULTS}
@@ -203,31 +182,6 @@ class FailureSettings:
     def of_sensors(self) -> Iterator[Failure]:
         """Those of sensors."""
         return (event for event in self.events if event.kind in OF_SENSORS)
-
-
-def check_failures(
-    settings: FailureSettings | None, robot: Robot, motors: bool, sensors: Sequence[str], path: Path
-) -> None:
-    """Checks the section of a scenario's file.
-
-    Args:
-        settings: The section.
-        robot: The robot.
-        motors: Whether its winches have motors.
-        sensors: Those that sample and are logged.
-        path: The file.
-
-    Raises:
-        ScenarioError: Something is not accepted; names the file and it.
-    """
-    problems = Problems(ScenarioError)
-    try:
-        if settings is not None:
-            winches = robot.winch_groups().count
-            settings.check(Equipment(len(robot.cables), winches, motors, tuple(sensors)))
-    except ScenarioError as problem:
-        problems.add(*(f"{path}: {line}" for line in problem.problems))
-    problems.raise_any()
 
 
 class Failures(LeafSystem):

@@ -4,16 +4,24 @@
 `mechanism_motion`.
 """
 
+from collections.abc import Iterator
 from dataclasses import fields
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 
-from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Text, filled, settings
+from cdpr_drake.schema.declarations import (
+    FASTEST,
+    In,
+    OneOf,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    settings,
+)
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableSettings
 from cdpr_drake.systems.scenarios.files import MECHANISM
 from cdpr_drake.systems.scenarios.run_settings import ExpectedEnd, RunHeader
@@ -126,40 +134,32 @@ class MechanismScenario(RunHeader):
             None if given is None else (float(given[0]), float(given[1]))
         )
 
-
-def check_settings(scenario: MechanismScenario, path: Path) -> None:
-    """What no single field of a scenario can tell; does not look at the mechanism.
-
-    Raises:
-        ScenarioError: Settings that do not go together, or times that do not grow.
-    """
-    problems, control = Problems(ScenarioError), scenario.control
-
-    def fail(key: str, found: object, accepted: str) -> None:
-        problems.add(f"{path}: {key}: found {found}; accepted: {accepted}")
-
-    if control.limits is not None and not control.limits[0] < control.limits[1]:
-        fail("control.limits", control.limits.tolist(), "lower < upper")
-    if control.kind == COMPUTED_TORQUE:
-        usual = CableSettings(pulleys=scenario.cables.pulleys)
-        for field in fields(CableSettings):
-            value = getattr(scenario.cables, field.name)
-            if value != getattr(usual, field.name):
-                fail(f"cables.{field.name}", value, f"with {WINCHES}; ideal cables have none")
-        if scenario.integration.engine != PLANT:
-            fail("integration.engine", scenario.integration.engine, f"{PLANT} by {COMPUTED_TORQUE}")
-        needed = METHODS[control.method].needs_reference
-        if needed and control.prestress is None:
-            fail("control.prestress", "null", f"a tension, which {control.method} needs [N]")
-        if not needed and control.prestress is not None:
-            fail("control.prestress", f"{control.prestress:g}", f"null with {control.method}")
-    elif control.method != USUAL_METHOD:
-        fail("control.method", control.method, f"with {COMPUTED_TORQUE}; winches share no tensions")
-    waypoints, before = scenario.motion.waypoints, 0.0
-    if not waypoints:
-        fail("motion.waypoints", "none", "at least one")
-    for k, each in enumerate(waypoints):
-        if not each.time > before:
-            fail(f"motion.waypoints[{k}].time", f"{each.time:g}", f"above {before:g} [s]")
-        before = each.time
-    problems.raise_any()
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Settings that do not go together; does not look at the mechanism."""
+        control, integration = self.control, self.integration
+        if control.limits is not None and not control.limits[0] < control.limits[1]:
+            yield "control.limits", control.limits.tolist(), "lower < upper"
+        if control.kind == COMPUTED_TORQUE:
+            usual = CableSettings(pulleys=self.cables.pulleys)
+            for field in fields(CableSettings):
+                value = getattr(self.cables, field.name)
+                if value != getattr(usual, field.name):
+                    yield f"cables.{field.name}", value, f"with {WINCHES}; ideal cables have none"
+            if integration.engine != PLANT:
+                yield "integration.engine", integration.engine, f"{PLANT} by {COMPUTED_TORQUE}"
+            needed = METHODS[control.method].needs_reference
+            if needed and control.prestress is None:
+                accepted = f"a tension, which {control.method} needs [N]"
+                yield "control.prestress", "null", accepted
+            if not needed and control.prestress is not None:
+                yield "control.prestress", f"{control.prestress:g}", f"null with {control.method}"
+        elif control.method != USUAL_METHOD:
+            accepted = f"with {COMPUTED_TORQUE}; winches share no tensions"
+            yield "control.method", control.method, accepted
+        if not self.motion.waypoints:
+            yield "motion.waypoints", "none", "at least one"
+        before = 0.0
+        for k, each in enumerate(self.motion.waypoints):
+            if not each.time > before:
+                yield f"motion.waypoints[{k}].time", f"{each.time:g}", f"above {before:g} [s]"
+            before = each.time

@@ -4,7 +4,7 @@
 section `sensors` that chooses their types.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
@@ -20,7 +20,7 @@ from cdpr_drake.models.sensor_catalogue import (
     pose_sensor_names,
     tension_sensor_names,
 )
-from cdpr_drake.schema.declarations import In, OneOf, filled, settings
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, filled, repeated, settings
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
@@ -136,6 +136,15 @@ class SensorSettings:
     log: Annotated[list[str], OneOf(SENSORS), "Sensors that are logged, used or not."] = filled(
         list
     )
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Rates beyond those of types, and sensors that are logged twice."""
+        yield from repeated(self.log, "log[{}]")
+        for sensor in SENSORS:
+            rate, largest = self.rate(sensor), self.largest_rate(sensor)
+            if rate is not None and largest is not None and rate > largest:
+                accepted = f"at most {largest:g} [Hz], that of {self.kind(sensor)}"
+                yield f"{sensor}_rate", f"{rate:g}", accepted
 
     def kind(self, sensor: str) -> str:
         """Type of one of `SENSORS`."""

@@ -1,6 +1,6 @@
 """Scenario section `sensors`: all of it, with the sensors that look at the world and at motion."""
 
-from collections.abc import Collection
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated
 
@@ -18,7 +18,20 @@ from cdpr_drake.models.sensor_catalogue import (
     load_range_sensor,
     range_sensor_names,
 )
-from cdpr_drake.schema.declarations import FASTEST, In, Name, OneOf, Text, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    FASTEST,
+    In,
+    Name,
+    OneOf,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    number_words,
+    repeated,
+    settings,
+    values,
+)
 from cdpr_drake.systems.sensors.depth_sensor import binned
 from cdpr_drake.systems.sensors.pan_tilt import MODES, PanTiltJoints
 from cdpr_drake.systems.sensors.scene_shapes import ROLES
@@ -162,6 +175,12 @@ class PanTiltSettings:
         float, In("deg", ge=0.0), "Standard deviation of an encoder's zero."
     ] = 0.0
 
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits with nothing between."""
+        if not np.all(self.lower_deg <= self.upper_deg):
+            accepted = f"at most upper_deg, {number_words(self.upper_deg)} [deg]"
+            yield "lower_deg", number_words(self.lower_deg), accepted
+
     def joints(self) -> PanTiltJoints:
         """The joints."""
         return PanTiltJoints(
@@ -227,57 +246,30 @@ class SensorSuite(SensorSettings):
         others = (self.imu, self.depth, self.pan_tilt, self.odometry)
         return bool(self.range_sensors) or any(other is not None for other in others)
 
-    def problems(self, on_wheels: bool, bodies: Collection[str] = ()) -> list[str]:
-        """What is wrong with these sensors, one line each that begins with the field.
-
-        Args:
-            on_wheels: Whether a mobile robot carries the target.
-            bodies: Names of what moves round the robot and may carry a sensor.
-        """
-        found = self._carrier_problems(bodies)
-        for field, sensor in self._typed().items():
-            rate, largest = sensor.rate, sensor.largest_rate()
-            if rate is not None and rate > largest:
-                found.append(
-                    f"{field}.rate: found {rate:g}; accepted: at most {largest:g} [Hz], that of "
-                    f"{sensor.type}"
-                )
-        names = [sensor.name for sensor in self.range_sensors]
-        for k, sensor in enumerate(self.range_sensors):
-            if sensor.name in names[:k]:
-                found.append(
-                    f"range_sensors[{k}].name: found {sensor.name} twice; accepted: each once"
-                )
-        head = self.pan_tilt
-        if head is not None and not np.all(head.lower_deg <= head.upper_deg):
-            found.append("pan_tilt.lower_deg: accepted: at most upper_deg, of both joints [deg]")
-        if self.odometry is not None and not on_wheels:
-            found.append(
-                "odometry: found a target that no mobile robot carries; accepted: null, or "
-                "target.motion.mobile_robot"
-            )
-        return found
-
-    def _carrier_problems(self, bodies: Collection[str]) -> list[str]:
-        """Sensors on what is not there, one line each."""
-        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings] = {
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Sensors on what is not there, or faster than their type, and names that come twice."""
+        yield from super().refusals(scope)
+        yield from repeated((one.name for one in self.range_sensors), "range_sensors[{}].name")
+        target, world = scope.whole.target, scope.whole.world
+        there = [PLATFORM, WORLD, *(["target"] if target.carrier == "world" else [])]
+        there += [] if world is None else world.moving()
+        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings | None] = {
             f"range_sensors[{k}]": sensor for k, sensor in enumerate(self.range_sensors)
-        }
-        if self.depth is not None:
-            carried["depth"] = self.depth
-        if self.pan_tilt is not None:
-            carried["pan_tilt"] = self.pan_tilt
-        found = []
+        } | {"depth": self.depth, "pan_tilt": self.pan_tilt}
         for name, sensor in carried.items():
-            there = [PLATFORM, WORLD, *bodies]
-            if isinstance(sensor, RangeSettings) and self.pan_tilt is not None:
-                there.append(HEAD)
-            if sensor.carrier not in there:
-                found.append(
-                    f"{name}.carrier: found {sensor.carrier}, which is not there; accepted: "
-                    + ", ".join(there)[:200]
-                )
-        return found
+            on_head = isinstance(sensor, RangeSettings) and self.pan_tilt is not None
+            known = [*there, HEAD] if on_head else there
+            if sensor is not None and sensor.carrier not in known:
+                found = f"{sensor.carrier}, which is not there"
+                yield f"{name}.carrier", found, ", ".join(known)[:200]
+        for name, one in self._typed().items():
+            rate, largest = one.rate, one.largest_rate()
+            if rate is not None and rate > largest:
+                yield f"{name}.rate", f"{rate:g}", f"at most {largest:g} [Hz], that of {one.type}"
+        on_wheels = target.motion is not None and target.motion.mobile_robot is not None
+        if self.odometry is not None and not on_wheels:
+            found = "a target that no mobile robot carries"
+            yield "odometry", found, "null, or target.motion.mobile_robot"
 
     def _typed(self) -> dict[str, RangeSettings | InertialSettings | DepthSettings]:
         """Those that are of a type of the catalogue, by their place in the section."""

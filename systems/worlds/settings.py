@@ -1,13 +1,28 @@
 """Scenario section `world`: ground and obstacles round the robot, and whether they touch it."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    Direction,
+    In,
+    Name,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    Text,
+    filled,
+    repeated,
+    settings,
+    values,
+)
 from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.systems.worlds.motions import BodyMotion, JointedBody, PathBody, SteadyBody
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
@@ -29,6 +44,12 @@ CONTACT_MODELS = (POINT, HYDROELASTIC)
 SMALLEST, FARTHEST = 1e-4, 1e3
 """Sizes of obstacles, and how far from the origin of W they may be [m]: beyond, distances of shapes
 are not good to a micrometre any more."""
+
+Near = Annotated[np.ndarray, In("m", 3, ge=-FARTHEST, le=FARTHEST)]
+"""A point that is not too far away."""
+
+SAME_POSE = 1e-9
+"""Distance [m] and angle [rad] between poses that count as the same."""
 
 ROOM_BELOW = 0.05
 """Below its frame a platform that may touch something is not lost yet, and plans may end there, so
@@ -53,8 +74,8 @@ class ObstacleWaypoint:
 class ObstacleJoint:
     """A revolute joint to the world that is driven: angle = rate t + amplitude sin(2 pi t / T)."""
 
-    point: Annotated[np.ndarray, In("m", 3), "A point of its axis in W."]
-    axis: Annotated[np.ndarray, In("-", 3), "Direction of its axis in W, of any length."]
+    point: Annotated[Near, "A point of its axis in W."]
+    axis: Annotated[Direction, "Direction of its axis in W, of any length."]
     rate_deg: Annotated[float, In("deg/s", ge=-100000.0, le=100000.0), "Rate of turning."] = 0.0
     amplitude_deg: Annotated[float, In("deg", ge=0.0, le=10000.0), "Amplitude of swinging."] = 0.0
     period: Annotated[float, In("s", ge=0.001), "Period T of swinging."] = 1.0
@@ -79,6 +100,22 @@ class ObstacleMotion:
         False
     )
     joint: Annotated[ObstacleJoint | None, "A joint that it turns on; null: none."] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Several kinds of motion at once, times that do not grow, and a way that is none."""
+        kinds = {
+            "waypoints": bool(self.waypoints),
+            "a velocity": self.has_velocity(),
+            "a joint": self.joint is not None,
+        }
+        several = [words for words, there in kinds.items() if there]
+        if len(several) > 1:
+            yield "", " and ".join(several), "one of them"
+        times = [point.time for point in self.waypoints]
+        if times != sorted(set(times)):
+            yield "waypoints", f"the times {times}", "growing ones"
+        if self.repeat and not self.waypoints:
+            yield "repeat", "true without waypoints", "false"
 
     def has_velocity(self) -> bool:
         """Whether a constant velocity is asked for."""
@@ -118,9 +155,37 @@ class ObstacleSettings:
     friction: Annotated[float, In("-", ge=0.0), "Friction coefficient of its surface."] = 0.5
     motion: Annotated[ObstacleMotion | None, "How it moves; null: it rests."] = None
 
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Dimensions of another kind, none of its own, and places that are too far away."""
+        for name in ("size", "radius", "length", "file"):
+            is_there, is_needed = getattr(self, name) is not None, name in DIMENSIONS[self.kind]
+            if is_there and not is_needed:
+                yield name, f"one of a {self.kind}", "null"
+            elif is_needed and not is_there:
+                yield name, "null", f"a value, for kind {self.kind}"
+        motion = self.motion or ObstacleMotion()
+        places = {"pose": self.pose}
+        places |= {
+            f"motion.waypoints[{k}].pose": one.pose for k, one in enumerate(motion.waypoints)
+        }
+        for name, pose in places.items():
+            if np.any(np.abs(pose.position) > FARTHEST):
+                accepted = f"within {FARTHEST:g} m of the origin along every axis"
+                yield f"{name}.position", pose.position.tolist(), accepted
+        yield from way_back_refusals(self.pose.transform(), motion)
+
     def path(self) -> BodyMotion:
         """Its pose over time."""
         return body_motion(self.pose.transform(), self.motion or ObstacleMotion())
+
+
+def way_back_refusals(start: RigidTransform, motion: ObstacleMotion) -> Iterator[Refusal]:
+    """A way that shall begin again at its end and does not end where the body starts."""
+    if motion.repeat and motion.waypoints:
+        ends = motion.waypoints[-1].pose.transform()
+        if max(pose_error(ends, start)) > SAME_POSE:
+            found = "true, but the last waypoint is not the obstacle's pose"
+            yield "motion.repeat", found, "false, or a way that ends where it begins"
 
 
 def body_motion(start: RigidTransform, motion: ObstacleMotion) -> BodyMotion:
@@ -207,6 +272,15 @@ class WorldSettings:
         ContactSettings | None,
         "Contact of the platform with them, {} for its defaults; null: it passes through.",
     ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Names that come twice, or are those of something else."""
+        taken = [*TAKEN, *([] if self.ground is None else [GROUND])]
+        names = [obstacle.name for obstacle in self.obstacles]
+        yield from repeated(names, "obstacles[{}].name")
+        for k, name in enumerate(names):
+            if name in taken:
+                yield f"obstacles[{k}].name", name, f"not one of {', '.join(taken)}"
 
     def moving(self) -> list[str]:
         """Names of the obstacles that move."""
