@@ -432,7 +432,7 @@ class Scope:
 
 def told(problem: Exception, key: str) -> Refusal:
     """A refusal in the words of an error, which may begin with a key of their own."""
-    own = re.match(r"([a-z_][a-z_0-9.\[\]]*): (found .*)", str(problem))
+    own = re.match(r"([a-z_]+(?:\.[a-z_0-9]+|\[\d+\])+): (found .*)", str(problem))
     return (own[1], own[2], "") if own else (key, str(problem), "")
 
 

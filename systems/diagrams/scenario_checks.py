@@ -117,7 +117,7 @@ def _believed_camera(scope: Scope) -> Iterator[Refusal]:
     """A camera that is believed in and is none."""
     scenario, key = scope.whole, "perturbations.camera_distortion"
     lens = scenario.perturbations.camera_distortion
-    if any(_mount(scope)) or (lens is not None and any(lens.refusals(scope))):
+    if any(scenario.camera.refusals(scope)) or (lens and any(lens.refusals(scope))):
         return
     try:
         believed = read_camera(scenario, scope.robot).believed
