@@ -24,8 +24,7 @@ from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_text
-from cdpr_drake.schema.json_schemas import json_schema
-from cdpr_drake.schema.templates import commented_yaml
+from cdpr_drake.schema.json_schemas import commented_yaml, json_schema
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.systems.diagrams.first_scenario import first_scenario
 from cdpr_drake.systems.diagrams.load import SCENARIO_SCHEMAS, load_scenario

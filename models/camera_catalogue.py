@@ -4,39 +4,42 @@ Files of your own, as `cdpr calibrate-camera` writes them, have the same fields,
 calibrated; `camera_info` files of ROS and files of OpenCV's FileStorage are read too.
 """
 
-from dataclasses import dataclass, fields, replace
+from collections.abc import Iterator
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_calibrations import read_calibration
 from cdpr_drake.models.camera_files import CAMERA_FOLDER, CAMERA_SUFFIXES, camera_names
-from cdpr_drake.schema.fields import array, number, optional_section, text, whole
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, Text, settings, values
+from cdpr_drake.schema.typed_yaml import closest, load_typed, refuse
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS, FARTHEST, NO_LENS, LensDistortion
 from cdpr_drake.vision.pinhole import Pinhole
 
 
-@dataclass(kw_only=True)
+@settings
 class Distortion:
     """What a lens does to the image of a pinhole, in the model and with the signs of OpenCV."""
 
-    kind: str = text(
-        "none; brown_conrady, radial with k1 to k6, k4 to k6 in a denominator, and tangential with "
-        "p1 and p2; fisheye, a polynomial of the angle from the axis with k1 to k4.",
-        NO_LENS,
-        choices=(NO_LENS, *COEFFICIENTS),
-    )
-    k1: float = number("First radial coefficient.", "-", 0.0)
-    k2: float = number("Second radial coefficient.", "-", 0.0)
-    p1: float = number("First tangential coefficient.", "-", 0.0)
-    p2: float = number("Second tangential coefficient.", "-", 0.0)
-    k3: float = number("Third radial coefficient.", "-", 0.0)
-    k4: float = number("Fourth radial coefficient.", "-", 0.0)
-    k5: float = number("Fifth radial coefficient.", "-", 0.0)
-    k6: float = number("Sixth radial coefficient.", "-", 0.0)
+    kind: Annotated[
+        str,
+        OneOf((NO_LENS, *COEFFICIENTS)),
+        "none; brown_conrady, radial with k1 to k6, k4 to k6 in a denominator, and "
+        "tangential with p1 and p2; fisheye, a polynomial of the angle from the axis with"
+        " k1 to k4.",
+    ] = NO_LENS
+    k1: Annotated[float, In("-"), "First radial coefficient."] = 0.0
+    k2: Annotated[float, In("-"), "Second radial coefficient."] = 0.0
+    p1: Annotated[float, In("-"), "First tangential coefficient."] = 0.0
+    p2: Annotated[float, In("-"), "Second tangential coefficient."] = 0.0
+    k3: Annotated[float, In("-"), "Third radial coefficient."] = 0.0
+    k4: Annotated[float, In("-"), "Fourth radial coefficient."] = 0.0
+    k5: Annotated[float, In("-"), "Fifth radial coefficient."] = 0.0
+    k6: Annotated[float, In("-"), "Sixth radial coefficient."] = 0.0
 
     def lens(self) -> LensDistortion | None:
         """The lens; None where it does nothing."""
@@ -45,67 +48,77 @@ class Distortion:
         names = COEFFICIENTS[self.kind]
         return LensDistortion(self.kind, tuple(float(getattr(self, name)) for name in names))
 
-    def problem(self) -> str:
-        """Words for a coefficient that its kind does not have; empty where all fit."""
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Coefficients that its kind does not have."""
         known = COEFFICIENTS.get(self.kind, ())
         for field in fields(self):
             value = getattr(self, field.name)
             if field.name != "kind" and field.name not in known and value != 0.0:
                 has = f"0, or {', '.join(known)}" if known else "0, or another kind"
-                return f"{field.name}: found {value:g} with kind {self.kind}; accepted: {has}"
-        return ""
+                yield field.name, f"{value:g} with kind {self.kind}", has
 
 
-def fold_problem(pinhole: Pinhole) -> str:
-    """Words for a lens whose image folds over, or that sees more than this package computes with,
-    within the picture; empty where neither is so."""
+def fold_refusals(pinhole: Pinhole, key: str) -> Iterator[Refusal]:
+    """A lens whose image folds over, or that sees more than this package computes with, within the
+    picture; `key` is that of the lens."""
     share = pinhole.blind_share()
     if share == 0.0:
-        return ""
+        return
     assert pinhole.distortion is not None
     angle = float(np.degrees(np.arctan(pinhole.distortion.valid_radius)))
+    lens, size = f"a {pinhole.distortion.kind} lens", f"{pinhole.width} x {pinhole.height} pixels"
     if pinhole.distortion.valid_radius == FARTHEST:
-        return (
-            f"found a {pinhole.distortion.kind} lens that sees more than {angle:.1f} deg from the "
-            f"axis at {100.0 * share:.0f} % of the rim of its {pinhole.width} x {pinhole.height} "
-            "pixels, beyond what this package computes with; accepted: less than a half space, as "
-            "of an image that was cropped"
+        found = (
+            f"{lens} that sees more than {angle:.1f} deg from the axis at {100.0 * share:.0f} % of "
+            f"the rim of its {size}, beyond what this package computes with"
         )
-    return (
-        f"found a {pinhole.distortion.kind} lens whose image folds over {angle:.1f} deg from the "
-        f"axis, within the image of {pinhole.width} x {pinhole.height} pixels, of whose rim it "
-        f"leaves {100.0 * share:.0f} % without a direction; accepted: coefficients that hold up to "
-        "the corners"
-    )
+        yield key, found, "less than a half space, as of an image that was cropped"
+    else:
+        found = (
+            f"{lens} whose image folds over {angle:.1f} deg from the axis, within the image of "
+            f"{size}, of whose rim it leaves {100.0 * share:.0f} % without a direction"
+        )
+        yield key, found, "coefficients that hold up to the corners"
 
 
-@dataclass(kw_only=True)
+@settings
 class Camera:
     """A camera with its lens."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type of camera and lens.")
-    source: str = text("Where the values stand.")
-    width: int = whole("Width of the full image.", unit="px", at_least=16)
-    height: int = whole("Height of the full image.", unit="px", at_least=16)
-    view_angle_horizontal_deg: float = number(
-        "Full view angle along the width.", "deg", above=0.0, below=180.0
-    )
-    view_angle_vertical_deg: float = number(
-        "Full view angle along the height.", "deg", above=0.0, below=180.0
-    )
-    rate_hz: float = number("Largest frame rate.", "Hz", above=0.0)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
-    principal_point: np.ndarray | None = array(
-        "Principal point (u, v) in the full image, from the middle of its upper left pixel; null: "
-        "the middle of the image.",
-        "px",
-        (2,),
-        None,
-    )
-    distortion: Distortion | None = optional_section(
-        "What the lens does to the image of the pinhole that the view angles mean; null: nothing."
-    )
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type of camera and lens."]
+    source: Annotated[Text, "Where the values stand."]
+    width: Annotated[int, In("px", ge=16), "Width of the full image."]
+    height: Annotated[int, In("px", ge=16), "Height of the full image."]
+    view_angle_horizontal_deg: Annotated[
+        float, In("deg", gt=0.0, lt=180.0), "Full view angle along the width."
+    ]
+    view_angle_vertical_deg: Annotated[
+        float, In("deg", gt=0.0, lt=180.0), "Full view angle along the height."
+    ]
+    rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest frame rate."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    principal_point: Annotated[
+        np.ndarray | None,
+        In("px", 2),
+        "Principal point (u, v) in the full image, from the middle of its upper left "
+        "pixel; null: the middle of the image.",
+    ] = None
+    distortion: Annotated[
+        Distortion | None,
+        "What the lens does to the image of the pinhole that the view angles mean; null: nothing.",
+    ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A principal point outside of the image, and lenses that fold it over."""
+        if self.principal_point is not None:
+            u, v = self.principal_point
+            if not (-0.5 < u < self.width - 0.5 and -0.5 < v < self.height - 0.5):
+                accepted = f"a point in the image of {self.width} x {self.height} pixels"
+                yield "principal_point", f"[{u:g}, {v:g}]", accepted
+                return
+        if self.distortion is None or not any(self.distortion.refusals(scope)):
+            yield from fold_refusals(self.pinhole(self.width, self.height), "distortion")
 
     def pinhole(self, width: int, height: int) -> Pinhole:
         """The pinhole camera with these view angles and an image of width x height [px].
@@ -145,31 +158,30 @@ class Camera:
 DEAD, FROZEN, OFF = "dead", "frozen", "off"
 
 
-@dataclass(kw_only=True)
+@settings
 class CameraFault:
     """A span of time in which a projected camera fails."""
 
-    kind: str = text(
-        "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last image "
-        "again and again; off: takes for the target what is beside it, or was itself knocked.",
-        DEAD,
-        choices=(DEAD, FROZEN, OFF),
-    )
-    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
-    duration: float = number("How long it lasts.", "s", above=0.0)
-    offset: np.ndarray = array(
+    kind: Annotated[
+        str,
+        OneOf((DEAD, FROZEN, OFF)),
+        "dead: finds nothing, as one that is covered or unplugged; frozen: gives its last"
+        " image again and again; off: takes for the target what is beside it, or was "
+        "itself knocked.",
+    ] = DEAD
+    start: Annotated[float, In("s", ge=0.0), "When it begins."] = 0.0
+    duration: Annotated[float, In("s", gt=0.0), "How long it lasts."]
+    offset: Annotated[
+        np.ndarray,
+        In("m", 3),
         "What is taken for the target, from its origin in the camera frame; kind off only.",
-        "m",
-        (3,),
-        (0.03, 0.0, 0.0),
-    )
-    angles_deg: np.ndarray = array(
-        "Angles of R = Rx Ry Rz by which the camera's frame is turned from the one it is believed "
-        "to have, as of a camera that was knocked; kind off only.",
-        "deg",
-        (3,),
-        (0.0, 0.0, 0.0),
-    )
+    ] = values(0.03, 0.0, 0.0)
+    angles_deg: Annotated[
+        np.ndarray,
+        In("deg", 3),
+        "Angles of R = Rx Ry Rz by which the camera's frame is turned from the one it is "
+        "believed to have, as of a camera that was knocked; kind off only.",
+    ] = values(0.0, 0.0, 0.0)
 
     def holds(self, time: float) -> bool:
         """Whether it fails at a time [s]."""
@@ -195,22 +207,13 @@ def load_camera_file(path: Path) -> Camera:
     """
     calibration = None if path.parent == CAMERA_FOLDER else read_calibration(path)
     if calibration is None:
-        camera = load_typed(Camera, path, error=RobotFileError)
+        camera = load_typed(
+            Camera, path, error=RobotFileError, scope=lambda camera: Scope(camera, path)
+        )
     else:
         lens = calibration.pop("distortion")
         camera = Camera(**calibration, distortion=None if lens is None else Distortion(**lens))
-    if camera.principal_point is not None:
-        u, v = camera.principal_point
-        if not (-0.5 < u < camera.width - 0.5 and -0.5 < v < camera.height - 0.5):
-            raise RobotFileError(
-                f"{path}: principal_point: found [{u:g}, {v:g}]; accepted: a point in the image of "
-                f"{camera.width} x {camera.height} pixels"
-            )
-    if camera.distortion is not None and camera.distortion.problem():
-        raise RobotFileError(f"{path}: distortion.{camera.distortion.problem()}")
-    fold = fold_problem(camera.pinhole(camera.width, camera.height))
-    if fold:
-        raise RobotFileError(f"{path}: distortion: {fold}")
+        refuse(camera, "", path=path, error=RobotFileError)
     return camera
 
 

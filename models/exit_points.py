@@ -2,38 +2,41 @@
 
 `Rail` is for reconfigurable robots: it says where a cable leaves the frame in a configuration.
 `Pulley` and `PlatformPulley` are schemas of swivelling pulleys.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import array, number
+from cdpr_drake.schema.declarations import LONGEST, Direction, In, Refusal, Scope, settings, values
 
 MARK = "@"
 """Between the name of a robot and where its exit points stand on their rails."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Rail:
     """A straight rail on which an exit point can be put; it stands still while the robot moves."""
 
-    axis: np.ndarray = array(
-        "Direction in W in which the coordinate grows; of any length.", "-", (3,)
-    )
-    lower: float = number("Smallest coordinate.", "m")
-    upper: float = number("Largest coordinate.", "m")
-    at: float = number("Coordinate, counted from `exit_point`.", "m", 0.0)
+    axis: Annotated[Direction, "Direction in W in which the coordinate grows; of any length."]
+    lower: Annotated[float, In("m"), "Smallest coordinate."]
+    upper: Annotated[float, In("m"), "Largest coordinate."]
+    at: Annotated[float, In("m"), "Coordinate, counted from `exit_point`."] = 0.0
 
     def shift(self) -> Array:
         """From `exit_point` to where the cable leaves, shape (3,) [m]."""
         return np.asarray(self.at * self.axis / np.linalg.norm(self.axis), float)
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A rail without length, and a coordinate beyond its ends."""
+        if not self.lower < self.upper:
+            yield "", f"lower {self.lower:g}, upper {self.upper:g}", "lower < upper"
+        elif not self.lower <= self.at <= self.upper:
+            yield "at", f"{self.at:g}", f"{self.lower:g} to {self.upper:g} [m]"
 
 
 def split_name(words: str) -> tuple[str, dict[str, float]]:
@@ -61,56 +64,32 @@ def split_name(words: str) -> tuple[str, dict[str, float]]:
     return name, found
 
 
-def check_rail(index: int, rail: Rail | None, fail: Callable[[str, object, str], None]) -> bool:
-    """Checks one rail; whether it has a direction."""
-    if rail is None:
-        return True
-    key = f"cables[{index}].rail"
-    if not np.any(rail.axis):
-        fail(
-            f"{key}.axis",
-            "(" + ", ".join(f"{x:g}" for x in rail.axis) + ")",
-            "a direction, not zero",
-        )
-        return False
-    if not rail.lower < rail.upper:
-        fail(key, f"lower {rail.lower:g}, upper {rail.upper:g}", "lower < upper")
-    elif not rail.lower <= rail.at <= rail.upper:
-        fail(f"{key}.at", f"{rail.at:g}", f"{rail.lower:g} to {rail.upper:g} [m]")
-    return True
-
-
-@dataclass(kw_only=True)
+@settings
 class Pulley:
     """The swivelling pulleys at the exit points."""
 
-    radius: float = number("Radius of the groove.", "m", at_least=0.0)
-    swivel_axis: np.ndarray = array(
-        "Direction in W in which the cable arrives at the exit point from its winch, and about "
-        "which the pulley swivels; of any length.",
-        "-",
-        (3,),
-        (0.0, 0.0, 1.0),
-    )
-    arm: float = number(
-        "Length of arms in the place of pulleys, across the swivel axis, about which they swivel: "
-        "cables begin at their ends. Of a platform that does not turn, arms at its anchor points "
-        "are the same.",
-        "m",
-        0.0,
-        at_least=0.0,
-    )
+    radius: Annotated[float, In("m", ge=0.0, le=LONGEST), "Radius of the groove."]
+    swivel_axis: Annotated[
+        Direction,
+        "Direction in W in which the cable arrives at the exit point from its winch, and "
+        "about which the pulley swivels; of any length.",
+    ] = values(0.0, 0.0, 1.0)
+    arm: Annotated[
+        float,
+        In("m", ge=0.0),
+        "Length of arms in the place of pulleys, across the swivel axis, about which they"
+        " swivel: cables begin at their ends. Of a platform that does not turn, arms at "
+        "its anchor points are the same.",
+    ] = 0.0
 
 
-@dataclass(kw_only=True)
+@settings
 class PlatformPulley:
     """Swivelling pulleys at the anchor points, where the platform has them."""
 
-    radius: float = number("Radius of the groove.", "m", at_least=0.0)
-    swivel_axis: np.ndarray = array(
-        "Direction in P in which the cable arrives at the anchor point from where it is fixed, and "
-        "about which the pulley swivels; of any length.",
-        "-",
-        (3,),
-        (0.0, 0.0, 1.0),
-    )
+    radius: Annotated[float, In("m", ge=0.0), "Radius of the groove."]
+    swivel_axis: Annotated[
+        Direction,
+        "Direction in P in which the cable arrives at the anchor point from where it is "
+        "fixed, and about which the pulley swivels; of any length.",
+    ] = values(0.0, 0.0, 1.0)

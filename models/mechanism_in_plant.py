@@ -21,9 +21,6 @@ from cdpr_drake.schema.input_files import input_path, input_text, inputs_held
 from cdpr_drake.schema.yaml_files import compose_yaml
 
 DIRECTIVES = (".dmd.yaml", ".dmd.yml")
-MODEL_SUFFIXES = (".dmd.yaml", ".dmd.yml", ".urdf", ".sdf", ".xml")
-"""Of files of bodies and joints: Drake's model directives, URDF, SDFormat, MJCF."""
-
 MOST_NAMES = 40
 """So many names that exist are said after a wrong one."""
 

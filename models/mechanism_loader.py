@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +10,18 @@ from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import PackageMap
 from pydrake.multibody.plant import MultibodyPlant
 
-from cdpr_drake.errors import CdprError, Problems, RobotFileError
-from cdpr_drake.models.drake_parsing import drake_line, package_name
-from cdpr_drake.models.materials import check_materials
+from cdpr_drake.errors import CdprError, RobotFileError
+from cdpr_drake.models.drake_parsing import package_name
 from cdpr_drake.models.mechanism_files import is_mechanism
-from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES, add_mechanism
-from cdpr_drake.models.mechanism_schema import Mechanism
+from cdpr_drake.models.mechanism_in_plant import add_mechanism
+from cdpr_drake.models.mechanism_schema import URL, Mechanism
 from cdpr_drake.models.plant_cables import PlantCables
-from cdpr_drake.models.robot_loader import LARGEST_LENGTH, load_robot, robot_file
+from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import Scope
 from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.schema.typed_yaml import load_typed, parse_typed
 
-URL = "package://"
 MANIFEST = "package.xml"
 
 LEAST_INERTIA = 1e-12
@@ -50,9 +49,12 @@ def load_mechanism(name: str | Path) -> Mechanism:
         raise RobotFileError(
             f"{path}: found a robot with one platform; accepted: a file with the key mechanism"
         )
-    mechanism = load_typed(Mechanism, path, error=RobotFileError)
-    _check(mechanism, path)
-    return mechanism
+    return _checked_in_plant(
+        load_typed(
+            Mechanism, path, error=RobotFileError, scope=lambda mechanism: _scope(mechanism, path)
+        ),
+        path,
+    )
 
 
 def parse_mechanism(content: str, path: Path) -> Mechanism:
@@ -65,9 +67,13 @@ def parse_mechanism(content: str, path: Path) -> Mechanism:
     Raises:
         RobotFileError: As `load_mechanism`.
     """
-    mechanism = parse_typed(Mechanism, content, path, error=RobotFileError)
-    _check(mechanism, path)
-    return mechanism
+    return _checked_in_plant(
+        parse_typed(
+            Mechanism, content, path, error=RobotFileError,
+            scope=lambda mechanism: _scope(mechanism, path),
+        ),
+        path,
+    )  # fmt: skip
 
 
 def load_robot_or_mechanism(name: str | Path) -> Robot | Mechanism:
@@ -109,111 +115,37 @@ def as_robot_or_mechanism(robot: Robot | Mechanism | str | Path) -> Robot | Mech
     )
 
 
-def _check(mechanism: Mechanism, path: Path) -> None:
-    """What no single field can tell."""
-    problems = Problems(RobotFileError)
-
-    def fail(field: str, found: object, accepted: str) -> None:
-        problems.add(f"{path}: {field}: found {found}; accepted: {accepted}")
-
-    bounds = mechanism.tension_bounds
-    if bounds.lower >= bounds.upper:
-        fail("tension_bounds", f"lower {bounds.lower:g}, upper {bounds.upper:g}", "lower < upper")
-    if not np.any(mechanism.gravity_direction):
-        fail("gravity_direction", "(0, 0, 0)", "a direction, not zero")
-    if mechanism.gravity > 1e3:
-        fail("gravity", f"{mechanism.gravity:g}", "at most 1000 [m/s^2]")
-    if not mechanism.cables:
-        fail("cables", "none", "at least one cable")
-    check_materials(mechanism.cable, [cable.material for cable in mechanism.cables], fail)
-    if mechanism.cable.behaviour is not None:
-        fail("cable.behaviour", "a section", "null: mechanisms have elastic cables")
-    _check_cables(mechanism, fail)
-    _find_packages(mechanism, path, fail)
-    _find_model(mechanism, path, fail)
-    problems.raise_any()
-    _check_in_plant(mechanism, path)
-
-
-def _check_cables(mechanism: Mechanism, fail: Callable[[str, object, str], None]) -> None:
-    names = [cable.name for cable in mechanism.cables]
-    pulleys = {"pulley": mechanism.pulley, "anchor_pulley": mechanism.anchor_pulley}
-    axes = {f"{key}.swivel_axis": one.swivel_axis for key, one in pulleys.items() if one}
-    for index, cable in enumerate(mechanism.cables):
-        key = f"cables[{index}]"
-        if cable.name in names[:index]:
-            fail(f"{key}.name", f"{cable.name} twice", "each name once")
-        for where, _, point in cable.route():
-            if np.any(np.abs(point) > LARGEST_LENGTH):
-                at = where.replace("frame", "point")
-                fail(f"{key}.{at}", point.tolist(), f"at most {LARGEST_LENGTH:g} [m]")
-        for end in ("swivel_axis", "anchor_swivel_axis"):
-            if getattr(cable, end) is not None:
-                axes[f"{key}.{end}"] = getattr(cable, end)
-    for key, axis in axes.items():
-        if not np.any(axis):
-            fail(key, "(0, 0, 0)", "a direction, not zero")
-
-
-def _find_packages(
-    mechanism: Mechanism, path: Path, fail: Callable[[str, object, str], None]
-) -> None:
-    """Makes given folders absolute, and adds packages that lie near the file."""
+def _scope(mechanism: Mechanism, path: Path) -> Scope:
+    """Makes folders of packages and the file of bodies absolute, and adds packages near it."""
     here = path.absolute().parent
-    given = {}
-    for name, folder in mechanism.packages.items():
-        where = (here / folder).resolve()
-        if not where.is_dir():
-            fail(f"packages.{name}", folder, "a folder")
-        given[name] = str(where)
+    folders = {name: str((here / at).resolve()) for name, at in mechanism.packages.items()}
     below = sorted(here.iterdir()) if here.is_dir() else []  # gone, where its files were read
     near = [here, *here.parents, *(child for child in below if child.is_dir())]
     found, elsewhere = PackageMap.MakeEmpty(), PackageMap.MakeEmpty()
     elsewhere.PopulateFromRosPackagePath()
     for manifest in (folder / MANIFEST for folder in near):
         if manifest.is_file():
-            try:
+            with suppress(RuntimeError):  # no manifest, or a second package of that name
                 found.AddPackageXml(str(manifest))
-            except RuntimeError:  # no manifest, or a second package of that name
-                continue
         elif (held := package_name(manifest)) is not None:
-            given.setdefault(held, str(manifest.parent))
-    for name in found.GetPackageNames():
-        given.setdefault(name, found.GetPath(name))
-    for name in elsewhere.GetPackageNames():
-        given.setdefault(name, elsewhere.GetPath(name))
-    mechanism.packages = given
+            folders.setdefault(held, str(manifest.parent))
+    for packages in (found, elsewhere):
+        for name in packages.GetPackageNames():
+            folders.setdefault(name, packages.GetPath(name))
+    mechanism.packages = folders
+    if mechanism.mechanism.startswith(URL):
+        known = PackageMap()
+        for name, folder in folders.items():
+            if not known.Contains(name) and Path(folder).is_dir():
+                known.Add(name, folder)
+        with suppress(RuntimeError):  # no such package, or no such file
+            mechanism.mechanism = known.ResolveUrl(mechanism.mechanism)
+    elif input_there(here / mechanism.mechanism):
+        mechanism.mechanism = str(here / mechanism.mechanism)
+    return Scope(mechanism, path)
 
 
-def _find_model(mechanism: Mechanism, path: Path, fail: Callable[[str, object, str], None]) -> None:
-    """Makes the name of the file of bodies absolute."""
-    given = mechanism.mechanism
-    if given.startswith(URL):
-        packages = PackageMap()
-        for name, folder in mechanism.packages.items():
-            if not packages.Contains(name):
-                packages.Add(name, folder)
-        package = given.removeprefix(URL).partition("/")[0]
-        if not packages.Contains(package):
-            known = ", ".join(mechanism.packages) or "none is known"
-            fail("mechanism", given, f"a file of a package: {known}; or the key packages")
-            return
-        try:
-            file = Path(packages.ResolveUrl(given))
-        except RuntimeError as problem:
-            fail("mechanism", f"{given}: {drake_line(problem)}", "a file of that package")
-            return
-    else:
-        file = path.absolute().parent / given
-    if not file.name.lower().endswith(MODEL_SUFFIXES):
-        fail("mechanism", given, f"a file that ends in {', '.join(MODEL_SUFFIXES)}")
-    elif not input_there(file):
-        fail("mechanism", given, "a file that is there")
-    else:
-        mechanism.mechanism = str(file)
-
-
-def _check_in_plant(mechanism: Mechanism, path: Path) -> None:
+def _checked_in_plant(mechanism: Mechanism, path: Path) -> Mechanism:
     """Builds it once, so that all that Drake refuses is said with the file."""
     plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)  # so that shapes are looked at, too
@@ -244,3 +176,4 @@ def _check_in_plant(mechanism: Mechanism, path: Path) -> None:
             f"{path}: mechanism: found a joint of {Path(mechanism.mechanism).name} that moves no "
             "mass; accepted: bodies with mass and inertia"
         )
+    return mechanism

@@ -2,92 +2,96 @@
 
 `Robot` is one platform on cables from the world; a `Mechanism` names a file of bodies and joints,
 and cables that run between any of its frames. Both share materials and tension bounds.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
 from cdpr_drake.models.robot_schema import Pose, TensionBounds
-from cdpr_drake.schema.fields import (
-    array,
-    file_name,
-    named_numbers,
-    named_sections,
-    named_texts,
-    number,
-    optional_section,
-    section,
-    sections,
-    text,
+from cdpr_drake.schema.declarations import (
+    Direction,
+    In,
+    Name,
+    Point,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    repeated,
+    settings,
+    values,
 )
+from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.summaries import Summarized
+
+URL = "package://"
+"""How the name of a file of a package begins."""
+
+MODEL_SUFFIXES = (".dmd.yaml", ".dmd.yml", ".urdf", ".sdf", ".xml")
+"""Of files of bodies and joints: Drake's model directives, URDF, SDFormat, MJCF."""
 
 WORLD = "world"
 """Name of the world's frame in files of mechanisms."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Eyelet:
     """A point that a cable runs through without friction."""
 
-    frame: str = text("Frame that carries it.")
-    point: np.ndarray = array("Where it is in that frame.", "m", (3,))
+    frame: Annotated[Text, "Frame that carries it."]
+    point: Annotated[Point, "Where it is in that frame."]
 
 
-@dataclass(kw_only=True)
+@settings
 class EndPulley:
     """Swivelling pulleys at the exit or the anchor points of all cables."""
 
-    radius: float = number("Radius of the groove.", "m", at_least=0.0)
-    swivel_axis: np.ndarray = array(
-        "Axis about which a pulley swivels, in the frame of its point, in the direction in which "
-        "the cable arrives from where it is wound or fixed; of any length.",
-        "-",
-        (3,),
-        (0.0, 0.0, 1.0),
-    )
+    radius: Annotated[float, In("m", ge=0.0), "Radius of the groove."]
+    swivel_axis: Annotated[
+        Direction,
+        "Axis about which a pulley swivels, in the frame of its point, in the direction "
+        "in which the cable arrives from where it is wound or fixed; of any length.",
+    ] = values(0.0, 0.0, 1.0)
 
 
-@dataclass(kw_only=True)
+@settings
 class MechanismCable:
     """One cable, from a point in a frame, through eyelets, to a point in a frame."""
 
-    name: str = file_name("Name, once in a mechanism.")
-    exit_point: np.ndarray = array("Exit point in `exit_frame`.", "m", (3,))
-    exit_frame: str = text(
-        "Frame or body of the exit point, as model::frame, or as frame where that is one.", WORLD
-    )
-    via: list[Eyelet] = sections("Eyelets from the exit to the anchor point.", required=False)
-    anchor_point: np.ndarray = array("Anchor point in `anchor_frame`.", "m", (3,))
-    anchor_frame: str = text("Frame or body of the anchor point.")
-    swivel_axis: np.ndarray | None = array(
-        "Swivel axis of its pulley, in `exit_frame`; null: that of `pulley`.", "-", (3,), None
-    )
-    pulley_radius: float | None = number(
-        "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
-    )
-    anchor_swivel_axis: np.ndarray | None = array(
+    name: Annotated[Name, "Name, once in a mechanism."]
+    exit_point: Annotated[Point, "Exit point in `exit_frame`."]
+    exit_frame: Annotated[
+        Text, "Frame or body of the exit point, as model::frame, or as frame where that is one."
+    ] = WORLD
+    via: Annotated[list[Eyelet], "Eyelets from the exit to the anchor point."] = filled(list)
+    anchor_point: Annotated[Point, "Anchor point in `anchor_frame`."]
+    anchor_frame: Annotated[Text, "Frame or body of the anchor point."]
+    swivel_axis: Annotated[
+        Direction | None,
+        "Swivel axis of its pulley, in `exit_frame`; null: that of `pulley`.",
+    ] = None
+    pulley_radius: Annotated[
+        float | None, In("m", ge=0.0), "Radius of the groove of its pulley; null: that of `pulley`."
+    ] = None
+    anchor_swivel_axis: Annotated[
+        Direction | None,
         "Swivel axis of its pulley at the anchor point, in `anchor_frame`; null: that of "
         "`anchor_pulley`.",
-        "-",
-        (3,),
-        None,
-    )
-    anchor_pulley_radius: float | None = number(
+    ] = None
+    anchor_pulley_radius: Annotated[
+        float | None,
+        In("m", ge=0.0),
         "Radius of the groove of its pulley at the anchor point; null: that of `anchor_pulley`.",
-        "m",
-        None,
-        at_least=0.0,
-    )
-    material: OwnMaterial | None = optional_section(
-        "What it is made of where that differs from `cable`; null: nothing differs."
-    )
+    ] = None
+    material: Annotated[
+        OwnMaterial | None,
+        "What it is made of where that differs from `cable`; null: nothing differs.",
+    ] = None
 
     def route(self) -> list[tuple[str, str, Array]]:
         """Its points: key in the file, frame and point, from the exit to the anchor point."""
@@ -98,54 +102,75 @@ class MechanismCable:
         ]
 
 
-@dataclass(kw_only=True)
+@settings
 class MechanismHome:
     """Where joints and bodies are at home."""
 
-    joints: dict[str, np.ndarray] = named_numbers(
+    joints: Annotated[
+        dict[str, np.ndarray],
+        In("rad, m", None, single=True),
         "Positions of joints by name, model::joint: a number, or a list where a joint has several.",
-        "rad, m",
-    )
-    bodies: dict[str, Pose] = named_sections(
-        "Poses in W of bodies that no joint carries, by name, model::body."
-    )
+    ] = filled(dict)
+    bodies: Annotated[
+        dict[str, Pose], "Poses in W of bodies that no joint carries, by name, model::body."
+    ] = filled(dict)
 
 
-@dataclass(kw_only=True, repr=False)
+@settings(repr=False)
 class Mechanism(Summarized):
     """A plant of Drake with cables between its frames."""
 
-    name: str = file_name("Name, the same as that of its folder.")
-    title: str = text("What it is, in one line.", "")
-    mechanism: str = text(
-        "File of its bodies and joints: Drake's model directives, URDF, SDFormat or MJCF; relative "
-        "to this file, or package://."
+    name: Annotated[Name, "Name, the same as that of its folder."]
+    title: Annotated[Text, "What it is, in one line."] = ""
+    mechanism: Annotated[
+        Text,
+        "File of its bodies and joints: Drake's model directives, URDF, SDFormat or MJCF;"
+        " relative to this file, or package://.",
+    ]
+    packages: Annotated[
+        dict[str, Text],
+        "Folders of packages by name, relative to this file, for package:// beside those "
+        "with a package.xml beside or above this file.",
+    ] = filled(dict)
+    gravity: Annotated[
+        float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
+    ] = 9.81
+    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+        0.0, 0.0, -1.0
     )
-    packages: dict[str, str] = named_texts(
-        "Folders of packages by name, relative to this file, for package:// beside those with a "
-        "package.xml beside or above this file."
-    )
-    gravity: float = number("Acceleration along `gravity_direction`.", "m/s^2", 9.81, at_least=0.0)
-    gravity_direction: np.ndarray = array(
-        "Where gravity points in W, of any length.", "-", (3,), (0.0, 0.0, -1.0)
-    )
-    cable: CableMaterial = section(
-        "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
-    )
-    pulley: EndPulley | None = optional_section(
-        "Pulleys at the exit points; null: the cables leave from fixed points."
-    )
-    anchor_pulley: EndPulley | None = optional_section(
-        "Pulleys at the anchor points; null: the cables are fixed there."
-    )
-    tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
-    home: MechanismHome = section(
-        "Positions to start from; what it does not name is as `mechanism` says.",
-        MechanismHome,
-        required=False,
-    )
-    cables: list[MechanismCable] = sections("The cables, in the order of all vectors of m.")
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    cable: Annotated[
+        CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
+    ]
+    pulley: Annotated[
+        EndPulley | None, "Pulleys at the exit points; null: the cables leave from fixed points."
+    ] = None
+    anchor_pulley: Annotated[
+        EndPulley | None, "Pulleys at the anchor points; null: the cables are fixed there."
+    ] = None
+    tension_bounds: Annotated[TensionBounds, "Accepted tensions."]
+    home: Annotated[
+        MechanismHome, "Positions to start from; what it does not name is as `mechanism` says."
+    ] = filled(MechanismHome)
+    cables: Annotated[list[MechanismCable], "The cables, in the order of all vectors of m."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What no mechanism is; what Drake refuses of its bodies is told when they are read."""
+        if not self.cables:
+            yield "cables", "none", "at least one cable"
+        yield from repeated((cable.name for cable in self.cables), "cables[{}].name")
+        if self.cable.behaviour is not None:
+            yield "cable.behaviour", "a section", "null: mechanisms have elastic cables"
+        for name, folder in self.packages.items():
+            if not Path(folder).is_dir():
+                yield f"packages.{name}", folder, "a folder"
+        if not self.mechanism.lower().endswith(MODEL_SUFFIXES):
+            yield "mechanism", self.mechanism, f"a file that ends in {', '.join(MODEL_SUFFIXES)}"
+        elif self.mechanism.startswith(URL):
+            known = ", ".join(self.packages) or "none is known"
+            yield "mechanism", self.mechanism, f"a file of a package: {known}; or the key packages"
+        elif not input_there(Path(self.mechanism)):
+            yield "mechanism", self.mechanism, "a file that is there"
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""

@@ -155,8 +155,7 @@ def _leaves(section: Any, prefix: str, added: bool) -> Iterator[tuple[str, Any, 
 
 
 def _is_required(field: Field[Any]) -> bool:
-    rule = field.metadata.get("rule")
-    return rule is not None and bool(rule.required)
+    return field.default is MISSING and field.default_factory is MISSING
 
 
 def _default(field: Field[Any]) -> Any:

@@ -1,10 +1,7 @@
-"""The schema of a robot file: what a cable robot is, with units and accepted ranges.
+"""The schema of a robot file: what a cable robot is, with units and accepted ranges."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -20,16 +17,23 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
 from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
 from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
-from cdpr_drake.models.shapes import Frame, PlatformShape
+from cdpr_drake.models.robot_refusals import robot_refusals
+from cdpr_drake.models.shapes import FITS, Frame, PlatformShape
 from cdpr_drake.models.winch_schema import Winch
-from cdpr_drake.schema.fields import (
-    array,
-    file_name,
-    number,
-    optional_section,
-    section,
-    sections,
-    text,
+from cdpr_drake.schema.declarations import (
+    LONGEST,
+    Direction,
+    In,
+    Name,
+    OneOf,
+    Point,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    number_words,
+    settings,
+    values,
 )
 from cdpr_drake.summaries import Summarized, numbers
 
@@ -43,32 +47,40 @@ if TYPE_CHECKING:  # statics need none of them
 BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
 
 
-@dataclass(kw_only=True)
+TRIANGLE_ROUNDING = 1e-15
+"""Moments of inertia of a plate meet the triangle inequality exactly, up to rounding."""
+
+
+@settings
 class Pose:
     """A pose as the literature of cable robots writes it, R = Rx(phi) Ry(theta) Rz(psi)."""
 
-    position: np.ndarray = array("Position (x, y, z).", "m", (3,))
-    angles_deg: np.ndarray = array("Angles (phi, theta, psi).", "deg", (3,), (0.0, 0.0, 0.0))
+    position: Annotated[Point, "Position (x, y, z)."]
+    angles_deg: Annotated[np.ndarray, In("deg", 3), "Angles (phi, theta, psi)."] = values(
+        0.0, 0.0, 0.0
+    )
 
     def transform(self) -> RigidTransform:
         """The pose as a RigidTransform."""
         return pose_from_angles(self.position, np.radians(self.angles_deg))
 
 
-@dataclass(kw_only=True)
+@settings
 class HysteresisSettings:
     """Friction against turns of the platform, in what it hangs on; see
     `dynamics.contact_hysteresis`."""
 
-    tilt: float = number(
-        "Stiffness of contacts that stick, about x and y of P.", "N m/rad", 0.0, at_least=0.0,
-        at_most=1e6,
-    )  # fmt: skip
-    turn: float = number("The same about z of P.", "N m/rad", 0.0, at_least=0.0, at_most=1e6)
-    slip: float = number(
-        "Turn at which contacts slip; the largest moment is this times the stiffness.", "rad", 0.1,
-        at_least=1e-4, at_most=10.0,
-    )  # fmt: skip
+    tilt: Annotated[
+        float,
+        In("N m/rad", ge=0.0, le=1000000.0),
+        "Stiffness of contacts that stick, about x and y of P.",
+    ] = 0.0
+    turn: Annotated[float, In("N m/rad", ge=0.0, le=1000000.0), "The same about z of P."] = 0.0
+    slip: Annotated[
+        float,
+        In("rad", ge=0.0001, le=10.0),
+        "Turn at which contacts slip; the largest moment is this times the stiffness.",
+    ] = 0.1
 
     def contacts(self) -> "ContactHysteresis":
         """These numbers as the law takes them."""
@@ -77,179 +89,242 @@ class HysteresisSettings:
         return ContactHysteresis(tilt=self.tilt, turn=self.turn, slip=self.slip)
 
 
-@dataclass(kw_only=True)
+@settings
 class Platform:
     """The moving platform; its frame P lies at the middle of the bottom face, z up, unless
     `box_center` says otherwise."""
 
-    mass: float = number("Mass.", "kg", above=0.0)
-    size: np.ndarray = array("Edges of its box along x, y, z of P.", "m", (3,), above=0.0)
-    box_center: np.ndarray | None = array(
+    mass: Annotated[float, In("kg", gt=0.0, le=1e7), "Mass."]
+    size: Annotated[
+        np.ndarray, In("m", 3, gt=0.0, le=LONGEST), "Edges of its box along x, y, z of P."
+    ]
+    box_center: Annotated[
+        np.ndarray | None,
+        In("m", 3),
         "Middle of the box in P, its edges along the axes of P; null: half its height above Po.",
-        "m",
-        (3,),
-        None,
-    )
-    center_of_mass: np.ndarray | None = array(
-        "Centre of mass in P; null: the middle of the box, of a point mass Po.", "m", (3,), None
-    )
-    inertia: np.ndarray | None = array(
-        "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of mass, "
-        "axes of P; null: those of a solid box.",
-        "kg m^2",
-        (6,),
-        None,
-    )
-    shape: PlatformShape | None = optional_section(
-        "Its shape, drawn in the place of the box, in which it lies; null: the box."
-    )
-    inertia_of: str = text(
-        "What a homogeneous body of its mass has of an inertia that is not given, and of a centre "
-        "of mass that is not.",
-        BOX_INERTIA,
-        choices=(BOX_INERTIA, SHAPE_INERTIA),
-    )
-    hysteresis: HysteresisSettings | None = optional_section(
-        "Friction against its turns, by Dahl, in knots, joints, ropes that bend and wires that "
-        "hang on it; null: none."
-    )
+    ] = None
+    center_of_mass: Annotated[
+        np.ndarray | None,
+        In("m", 3),
+        "Centre of mass in P; null: the middle of the box, of a point mass Po.",
+    ] = None
+    inertia: Annotated[
+        np.ndarray | None,
+        In("kg m^2", 6),
+        "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of "
+        "mass, axes of P; null: those of a solid box.",
+    ] = None
+    shape: Annotated[
+        PlatformShape | None,
+        "Its shape, drawn in the place of the box, in which it lies; null: the box.",
+    ] = None
+    inertia_of: Annotated[
+        str,
+        OneOf((BOX_INERTIA, SHAPE_INERTIA)),
+        "What a homogeneous body of its mass has of an inertia that is not given, and of "
+        "a centre of mass that is not.",
+    ] = BOX_INERTIA
+    hysteresis: Annotated[
+        HysteresisSettings | None,
+        "Friction against its turns, by Dahl, in knots, joints, ropes that bend and wires"
+        " that hang on it; null: none.",
+    ] = None
+
+    def middle(self) -> Array:
+        """Middle of the box in P, shape (3,) [m]."""
+        if self.box_center is not None:
+            return np.asarray(self.box_center, float)
+        return np.array([0.0, 0.0, self.size[2] / 2.0])
+
+    def rotational_inertia(self) -> Array:
+        """About the centre of mass, axes of P, shape (3, 3) [kg m^2]; of a box if not given."""
+        if self.inertia is None:
+            x, y, z = np.square(self.size)
+            return self.mass / 12.0 * np.diag([y + z, x + z, x + y])
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Moments of inertia that no body has, and a shape that reaches out of the box."""
+        if self.inertia is not None:
+            least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
+            if least <= 0.0 or least + middle < most * (1.0 - TRIANGLE_ROUNDING):
+                accepted = "positive principal moments, none larger than the sum of the other two"
+                yield "inertia", number_words(self.inertia), accepted
+        is_of_shape = self.inertia_of == SHAPE_INERTIA
+        if self.shape is None and is_of_shape:
+            yield "inertia_of", "shape", "box, or a section platform.shape"
+        if self.shape is None or any(self.shape.refusals(scope)):
+            return
+        center, edges = self.middle(), np.asarray(self.size, float)
+        lowest, highest = center - edges / 2.0, center + edges / 2.0
+        slack = FITS * float(np.max(edges))
+        lower, upper = self.shape.extent(center)
+        if np.any(lower < lowest - slack) or np.any(upper > highest + slack):
+            found = f"reaching from {number_words(lower)} to {number_words(upper)} m"
+            box = f"{number_words(lowest)} to {number_words(highest)} m"
+            yield "shape", found, f"within {box}, the box, with which pulleys and clearances reckon"
+        if is_of_shape:
+            self.shape.inertia(self.mass, center)
 
 
-@dataclass(kw_only=True)
+@settings
 class PlatformDamping:
     """Viscous damping of the platform's motion about Po, by air, pulleys and joints."""
 
-    translation: float = number("Force per velocity of Po.", "N s/m", 0.0, at_least=0.0)
-    rotation: float = number("Moment per angular velocity.", "N m s/rad", 0.0, at_least=0.0)
+    translation: Annotated[float, In("N s/m", ge=0.0), "Force per velocity of Po."] = 0.0
+    rotation: Annotated[float, In("N m s/rad", ge=0.0), "Moment per angular velocity."] = 0.0
 
 
-@dataclass(kw_only=True)
+@settings
 class TensionBounds:
     """Tensions that the robot may hold."""
 
-    lower: float = number("Smallest tension.", "N", at_least=0.0)
-    upper: float = number("Largest tension.", "N", above=0.0)
+    lower: Annotated[float, In("N", ge=0.0), "Smallest tension."]
+    upper: Annotated[float, In("N", gt=0.0, le=1e9), "Largest tension."]
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Bounds with nothing between."""
+        if self.lower >= self.upper:
+            yield "", f"lower {self.lower:g}, upper {self.upper:g}", "lower < upper"
 
 
-@dataclass(kw_only=True)
+@settings
 class Cable:
     """One cable: where it leaves the frame and where it holds the platform."""
 
-    name: str = file_name("Name, once in a robot.")
-    exit_point: np.ndarray = array("Exit point A in W.", "m", (3,))
-    anchor_point: np.ndarray = array("Anchor point B in P.", "m", (3,))
-    swivel_axis: np.ndarray | None = array(
-        "Swivel axis of its pulley; null: that of `pulley`.", "-", (3,), None
+    name: Annotated[Name, "Name, once in a robot."]
+    exit_point: Annotated[Point, "Exit point A in W."]
+    anchor_point: Annotated[Point, "Anchor point B in P."]
+    swivel_axis: Annotated[
+        Direction | None, "Swivel axis of its pulley; null: that of `pulley`."
+    ] = None
+    pulley_radius: Annotated[
+        float | None, In("m", ge=0.0), "Radius of the groove of its pulley; null: that of `pulley`."
+    ] = None
+    rail: Annotated[Rail | None, "Rail on which its exit point can be put; null: it is fixed."] = (
+        None
     )
-    pulley_radius: float | None = number(
-        "Radius of the groove of its pulley; null: that of `pulley`.", "m", None, at_least=0.0
-    )
-    rail: Rail | None = optional_section(
-        "Rail on which its exit point can be put; null: it is fixed."
-    )
-    winch: str | None = text(
-        "Name of its winch; cables with the same one are wound on one. Null: one of its own.", None
-    )
-    anchor_swivel_axis: np.ndarray | None = array(
+    winch: Annotated[
+        Text | None,
+        "Name of its winch; cables with the same one are wound on one. Null: one of its own.",
+    ] = None
+    anchor_swivel_axis: Annotated[
+        Direction | None,
         "Swivel axis in P of its pulley at the platform; null: that of `platform_pulley`.",
-        "-",
-        (3,),
-        None,
-    )
-    anchor_pulley_radius: float | None = number(
-        "Radius of the groove of its pulley at the platform; null: that of `platform_pulley`, 0 "
-        "without one.",
-        "m",
-        None,
-        at_least=0.0,
-    )
-    material: OwnMaterial | None = optional_section(
-        "What it is made of where that differs from `cable`; null: nothing differs."
-    )
-    drum_radius: float | None = number(
-        "Radius of its drum; null: that of `winch`.", "m", None, above=0.0
-    )
-    mechanical_advantage: float = number(
-        "Parts of line side by side between exit and anchor point, a block and tackle: line that "
-        "its drum winds over length of the cable. The material is that of all parts together; "
-        "rated speeds are of cables with 1.",
-        "-",
-        1.0,
-        at_least=1.0,
-    )
+    ] = None
+    anchor_pulley_radius: Annotated[
+        float | None,
+        In("m", ge=0.0),
+        "Radius of the groove of its pulley at the platform; null: that of "
+        "`platform_pulley`, 0 without one.",
+    ] = None
+    material: Annotated[
+        OwnMaterial | None,
+        "What it is made of where that differs from `cable`; null: nothing differs.",
+    ] = None
+    drum_radius: Annotated[
+        float | None, In("m", gt=0.0), "Radius of its drum; null: that of `winch`."
+    ] = None
+    mechanical_advantage: Annotated[
+        float,
+        In("-", ge=1.0),
+        "Parts of line side by side between exit and anchor point, a block and tackle: "
+        "line that its drum winds over length of the cable. The material is that of all "
+        "parts together; rated speeds are of cables with 1.",
+    ] = 1.0
 
     def base_of(self, p_WA: Array) -> Array:
         """The `exit_point` with which the cable leaves the frame at p_WA, shape (3,) [m]."""
         return np.array(p_WA if self.rail is None else p_WA - self.rail.shift(), float)
 
 
-@dataclass(kw_only=True)
+@settings
 class CameraMount:
     """A camera of the catalogue, or of a file, and where it is mounted."""
 
-    name: str = text("Name of the mounting, once in a robot.")
-    model: str = text("Camera of the catalogue, or path of a camera file.")
-    parent: str = text("What carries it.", "platform", choices=("platform", "world"))
-    pose: Pose = section("Pose of the camera frame C in the parent, z forward, y down.", Pose)
+    name: Annotated[Text, "Name of the mounting, once in a robot."]
+    model: Annotated[Text, "Camera of the catalogue, or path of a camera file."]
+    parent: Annotated[str, OneOf(("platform", "world")), "What carries it."] = "platform"
+    pose: Annotated[Pose, "Pose of the camera frame C in the parent, z forward, y down."]
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Cameras of no catalogue, and wrong files."""
+        from cdpr_drake.models.camera_files import CAMERA_SUFFIXES, camera_names
+
+        if self.model.lower().endswith(CAMERA_SUFFIXES):
+            from cdpr_drake.models.camera_catalogue import load_camera
+
+            load_camera(self.model)
+        elif self.model not in camera_names():
+            names = ", ".join(camera_names())
+            yield "model", self.model, f"one of {names}, or the path of a camera file"
 
 
-@dataclass(kw_only=True, repr=False)
+@settings(repr=False)
 class Robot(Summarized):
     """A cable-driven parallel robot."""
 
-    name: str = file_name("Name, the same as that of its folder.")
-    title: str = text("What it is, in one line.", "")
-    motion: str = text(
-        "Motion type: of a point mass 1T, 2T, 3T; of a body in a plane 2T1R, also named 1R2T; of a "
-        "beam 2R3T; of a body in space 3R3T.",
-        "3R3T",
-        choices=tuple(MOTION_TYPES),
+    name: Annotated[Name, "Name, the same as that of its folder."]
+    title: Annotated[Text, "What it is, in one line."] = ""
+    motion: Annotated[
+        str,
+        OneOf(MOTION_TYPES),
+        "Motion type: of a point mass 1T, 2T, 3T; of a body in a plane 2T1R, also named "
+        "1R2T; of a beam 2R3T; of a body in space 3R3T.",
+    ] = "3R3T"
+    axis: Annotated[
+        Direction | None,
+        "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the "
+        "plane in W, of 2R3T that of the beam in P, of any length; null: z. Line and "
+        "plane go through the home position.",
+    ] = None
+    plane_height: Annotated[
+        float | None,
+        In("m"),
+        "Height of Po in W for a robot in a horizontal plane; null otherwise.",
+    ] = None
+    gravity: Annotated[
+        float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
+    ] = 9.81
+    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+        0.0, 0.0, -1.0
     )
-    axis: np.ndarray | None = array(
-        "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the plane in W, "
-        "of 2R3T that of the beam in P, of any length; null: z. Line and plane go through the home "
-        "position.",
-        "-",
-        (3,),
-        None,
-    )
-    plane_height: float | None = number(
-        "Height of Po in W for a robot in a horizontal plane; null otherwise.", "m", None
-    )
-    gravity: float = number("Acceleration along `gravity_direction`.", "m/s^2", 9.81, at_least=0.0)
-    gravity_direction: np.ndarray = array(
-        "Where gravity points in W, of any length.", "-", (3,), (0.0, 0.0, -1.0)
-    )
-    platform: Platform = section("The moving platform.", Platform)
-    cable: CableMaterial = section(
-        "Material of the cables; the key `material` of a cable goes before it.", CableMaterial
-    )
-    cable_model: str | None = text(
-        "How a cable answers to its length, in simulations and at rest; scenarios and options "
-        "override it. Default: straight cables without weight.",
-        None,
-        choices=tuple(name for name, model in CABLE_MODELS.items() if model.extensible),
-    )
-    damping: PlatformDamping = section(
-        "Viscous damping of the platform in simulations, in addition to its cables; scenarios "
-        "override it.",
+    platform: Annotated[Platform, "The moving platform."]
+    cable: Annotated[
+        CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
+    ]
+    cable_model: Annotated[
+        str | None,
+        OneOf(tuple((name for name, model in CABLE_MODELS.items() if model.extensible))),
+        "How a cable answers to its length, in simulations and at rest; scenarios and "
+        "options override it. Default: straight cables without weight.",
+    ] = None
+    damping: Annotated[
         PlatformDamping,
-        required=False,
-    )
-    pulley: Pulley = section("Pulleys.", Pulley)
-    platform_pulley: PlatformPulley | None = optional_section(
-        "Pulleys at the anchor points; null: the cables are fixed there."
-    )
-    winch: Winch = section("Winches.", Winch)
-    tension_bounds: TensionBounds = section("Accepted tensions.", TensionBounds)
-    frame: Frame = section("The frame.", Frame)
-    home: Pose = section("A pose well inside the workspace.", Pose)
-    cables: list[Cable] = sections("The cables, in the order of all vectors of m.")
-    cameras: list[CameraMount] = sections("Camera mountings.", required=False)
-    slack_readings: np.ndarray | None = array(
-        "What tension sensors read while the cables are slack; null: zero.", "N", (None,), None
-    )
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+        "Viscous damping of the platform in simulations, in addition to its cables; "
+        "scenarios override it.",
+    ] = filled(PlatformDamping)
+    pulley: Annotated[Pulley, "Pulleys."]
+    platform_pulley: Annotated[
+        PlatformPulley | None, "Pulleys at the anchor points; null: the cables are fixed there."
+    ] = None
+    winch: Annotated[Winch, "Winches."]
+    tension_bounds: Annotated[TensionBounds, "Accepted tensions."]
+    frame: Annotated[Frame, "The frame."]
+    home: Annotated[Pose, "A pose well inside the workspace."]
+    cables: Annotated[list[Cable], "The cables, in the order of all vectors of m."]
+    cameras: Annotated[list[CameraMount], "Camera mountings."] = filled(list)
+    slack_readings: Annotated[
+        np.ndarray | None,
+        In("N", None),
+        "What tension sensors read while the cables are slack; null: zero.",
+    ] = None
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What no robot is."""
+        yield from robot_refusals(self)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
         """What it shows of itself."""
@@ -402,9 +477,7 @@ class Robot(Summarized):
 
     def box_center(self) -> Array:
         """Middle of the platform's box in P, shape (3,) [m]."""
-        if self.platform.box_center is None:
-            return np.array([0.0, 0.0, self.platform.size[2] / 2.0])
-        return np.asarray(self.platform.box_center, float)
+        return self.platform.middle()
 
     def drum(self) -> "Drum":
         """Drums and gears of the winches, blocks and tackles included."""

@@ -1,14 +1,13 @@
 """The catalogue of sensors, as published: of tensions, angles, poses, ranges, motion, depth."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import FASTEST, array, number, text, whole
+from cdpr_drake.schema.declarations import FASTEST, In, Text, settings
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "sensors"
@@ -16,84 +15,84 @@ _FOLDER = Path(__file__).parent / "sensors"
 _Model = TypeVar("_Model")
 
 
-@dataclass(kw_only=True)
+@settings
 class TensionSensorModel:
     """A type of tension sensor; one is fixed to every cable."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    limits: np.ndarray = array("Smallest and largest reading.", "N", (2,))
-    accuracy: float = number("Largest constant error of a sensor.", "N", at_least=0.0)
-    repeatability: float = number("Standard deviation of repeated readings.", "N", at_least=0.0)
-    resolution: float = number("Step between readings; 0: none.", "N", 0.0, at_least=0.0)
-    rate_hz: float = number("Largest number of readings per second.", "Hz", above=0.0)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    limits: Annotated[np.ndarray, In("N", 2), "Smallest and largest reading."]
+    accuracy: Annotated[float, In("N", ge=0.0), "Largest constant error of a sensor."]
+    repeatability: Annotated[float, In("N", ge=0.0), "Standard deviation of repeated readings."]
+    resolution: Annotated[float, In("N", ge=0.0), "Step between readings; 0: none."] = 0.0
+    rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of readings per second."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class EncoderModel:
     """A type of encoder; one is on every motor's shaft."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    counts_per_turn: int = whole("Counts per turn of the motor.", at_least=1)
-    rate_hz: float = number("Largest number of readings per second.", "Hz", above=0.0)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    counts_per_turn: Annotated[int, In(ge=1), "Counts per turn of the motor."]
+    rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of readings per second."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class PoseSensorModel:
     """A system that measures the pose of the platform from outside."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    position_accuracy: float = number(
-        "Constant error of position, where it was registered.", "m", at_least=0.0
-    )
-    rotation_accuracy_deg: float = number("Constant error of rotation.", "deg", at_least=0.0)
-    position_repeatability: float = number(
-        "Standard deviation of each coordinate.", "m", at_least=0.0
-    )
-    rotation_repeatability_deg: float = number(
-        "Standard deviation of each component of the rotation vector.", "deg", at_least=0.0
-    )
-    error_per_distance: float = number(
-        "Error of position per distance from where it was registered.", "m/m", 0.0, at_least=0.0
-    )
-    error_per_angle: float = number(
-        "Error of position per angle from how it was registered.", "m/rad", 0.0, at_least=0.0
-    )
-    rate_hz: float = number("Largest number of poses per second.", "Hz", above=0.0)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    position_accuracy: Annotated[
+        float, In("m", ge=0.0), "Constant error of position, where it was registered."
+    ]
+    rotation_accuracy_deg: Annotated[float, In("deg", ge=0.0), "Constant error of rotation."]
+    position_repeatability: Annotated[
+        float, In("m", ge=0.0), "Standard deviation of each coordinate."
+    ]
+    rotation_repeatability_deg: Annotated[
+        float, In("deg", ge=0.0), "Standard deviation of each component of the rotation vector."
+    ]
+    error_per_distance: Annotated[
+        float, In("m/m", ge=0.0), "Error of position per distance from where it was registered."
+    ] = 0.0
+    error_per_angle: Annotated[
+        float, In("m/rad", ge=0.0), "Error of position per angle from how it was registered."
+    ] = 0.0
+    rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of poses per second."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class RangeSensorModel:
     """A laser scanner, whose beams are a fan in the plane z = 0 of its frame S, or one beam.
 
     Angles are from x, the front, towards y, the left.
     """
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    first_angle_deg: float = number("Angle of the first beam.", "deg", at_least=-360, at_most=360)
-    last_angle_deg: float = number("Angle of the last beam.", "deg", at_least=-360, at_most=360)
-    beams: int = whole("Beams, evenly from the first to the last.", at_least=1, at_most=10_000)
-    limits: np.ndarray = array("Smallest and largest range.", "m", (2,), at_least=0.0, at_most=1e5)
-    noise: float = number("Standard deviation of a reading.", "m", at_least=0.0)
-    noise_share: float = number(
-        "What is added to that for each metre of range.", "m/m", 0.0, at_least=0.0
-    )
-    resolution: float = number("Step between readings; 0: none.", "m", 0.0, at_least=0.0)
-    rate_hz: float = number("Largest number of scans per second.", "Hz", above=0.0, at_most=FASTEST)
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    first_angle_deg: Annotated[float, In("deg", ge=-360, le=360), "Angle of the first beam."]
+    last_angle_deg: Annotated[float, In("deg", ge=-360, le=360), "Angle of the last beam."]
+    beams: Annotated[int, In(ge=1, le=10000), "Beams, evenly from the first to the last."]
+    limits: Annotated[np.ndarray, In("m", 2, ge=0.0, le=100000.0), "Smallest and largest range."]
+    noise: Annotated[float, In("m", ge=0.0), "Standard deviation of a reading."]
+    noise_share: Annotated[
+        float, In("m/m", ge=0.0), "What is added to that for each metre of range."
+    ] = 0.0
+    resolution: Annotated[float, In("m", ge=0.0), "Step between readings; 0: none."] = 0.0
+    rate_hz: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Largest number of scans per second."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class InertialSensorModel:
     """An inertial measurement unit: three accelerometers and three gyroscopes along x, y, z of S.
 
@@ -101,48 +100,46 @@ class InertialSensorModel:
     anywhere and walks at random.
     """
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    accelerometer_noise: float = number("Density of white noise.", "m/s^2/sqrt(Hz)", at_least=0.0)
-    accelerometer_walk: float = number("Random walk of the bias.", "m/s^3/sqrt(Hz)", at_least=0.0)
-    accelerometer_bias: float = number(
-        "Standard deviation of the bias at time 0.", "m/s^2", at_least=0.0
-    )
-    accelerometer_limit: float = number("Largest reading, either way.", "m/s^2", above=0.0)
-    gyroscope_noise: float = number("Density of white noise.", "rad/s/sqrt(Hz)", at_least=0.0)
-    gyroscope_walk: float = number("Random walk of the bias.", "rad/s^2/sqrt(Hz)", at_least=0.0)
-    gyroscope_bias: float = number(
-        "Standard deviation of the bias at time 0.", "rad/s", at_least=0.0
-    )
-    gyroscope_limit: float = number("Largest reading, either way.", "rad/s", above=0.0)
-    rate_hz: float = number(
-        "Largest number of readings per second.", "Hz", above=0.0, at_most=FASTEST
-    )
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    accelerometer_noise: Annotated[float, In("m/s^2/sqrt(Hz)", ge=0.0), "Density of white noise."]
+    accelerometer_walk: Annotated[float, In("m/s^3/sqrt(Hz)", ge=0.0), "Random walk of the bias."]
+    accelerometer_bias: Annotated[
+        float, In("m/s^2", ge=0.0), "Standard deviation of the bias at time 0."
+    ]
+    accelerometer_limit: Annotated[float, In("m/s^2", gt=0.0), "Largest reading, either way."]
+    gyroscope_noise: Annotated[float, In("rad/s/sqrt(Hz)", ge=0.0), "Density of white noise."]
+    gyroscope_walk: Annotated[float, In("rad/s^2/sqrt(Hz)", ge=0.0), "Random walk of the bias."]
+    gyroscope_bias: Annotated[
+        float, In("rad/s", ge=0.0), "Standard deviation of the bias at time 0."
+    ]
+    gyroscope_limit: Annotated[float, In("rad/s", gt=0.0), "Largest reading, either way."]
+    rate_hz: Annotated[
+        float, In("Hz", gt=0.0, le=FASTEST), "Largest number of readings per second."
+    ]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class DepthSensorModel:
     """A depth camera; depth is along the optical axis."""
 
-    name: str = text("Name, the same as that of its file.")
-    title: str = text("Maker and type.")
-    source: str = text("Where the values stand.")
-    width: int = whole("Pixels of a row.", unit="px", at_least=1, at_most=4096)
-    height: int = whole("Rows.", unit="px", at_least=1, at_most=4096)
-    focal_length: float = number(
-        "Focal length, of rows and columns.", "px", at_least=1.0, at_most=1e5
-    )
-    limits: np.ndarray = array("Smallest and largest depth.", "m", (2,), at_least=1e-3, at_most=1e4)
-    noise: float = number("Standard deviation of a depth.", "m", at_least=0.0)
-    noise_per_square: float = number(
-        "What is added to that for each square metre of depth squared.", "1/m", 0.0, at_least=0.0
-    )
-    rate_hz: float = number(
-        "Largest number of images per second.", "Hz", above=0.0, at_most=FASTEST
-    )
-    assumptions: str = text("Values that no source gives, and what they were taken from.", "")
+    name: Annotated[Text, "Name, the same as that of its file."]
+    title: Annotated[Text, "Maker and type."]
+    source: Annotated[Text, "Where the values stand."]
+    width: Annotated[int, In("px", ge=1, le=4096), "Pixels of a row."]
+    height: Annotated[int, In("px", ge=1, le=4096), "Rows."]
+    focal_length: Annotated[
+        float, In("px", ge=1.0, le=100000.0), "Focal length, of rows and columns."
+    ]
+    limits: Annotated[np.ndarray, In("m", 2, ge=0.001, le=10000.0), "Smallest and largest depth."]
+    noise: Annotated[float, In("m", ge=0.0), "Standard deviation of a depth."]
+    noise_per_square: Annotated[
+        float, In("1/m", ge=0.0), "What is added to that for each square metre of depth squared."
+    ] = 0.0
+    rate_hz: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Largest number of images per second."]
+    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 def tension_sensor_names() -> tuple[str, ...]:

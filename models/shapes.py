@@ -1,23 +1,32 @@
 """Shapes of platform and frame where they are no boxes: spheres, cylinders, meshes, beams.
 
-`PlatformShape`, `FrameBeam` and `Frame` are schemas of a robot file. `check_shapes` holds what a
-file says of shapes against the platform's box and the file's folder.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
+`PlatformShape`, `FrameBeam` and `Frame` are sections of a robot file.
 """
 
-from dataclasses import dataclass
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import Problems, RobotFileError
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.poses import pose_from_angles
-from cdpr_drake.schema.fields import array, number, sections, switch, text
+from cdpr_drake.schema.declarations import (
+    In,
+    OneOf,
+    Point,
+    Refusal,
+    Scope,
+    Switch,
+    Text,
+    filled,
+    number_words,
+    settings,
+    values,
+)
 from cdpr_drake.schema.input_files import input_bytes, input_path, input_there, inputs_held
 
 if TYPE_CHECKING:  # slow to import, and most robots are boxes
@@ -32,35 +41,42 @@ MESH_SUFFIXES = (".obj", ".gltf")
 _NEEDS = {BOX: "size", SPHERE: "radius", CYLINDER: "radius", MESH: "file"}
 
 
-@dataclass(kw_only=True)
+@settings
 class PlatformShape:
     """The platform's shape within its box, with which pulleys and clearances reckon."""
 
-    kind: str = text("What it is.", choices=(BOX, SPHERE, CYLINDER, MESH))
-    size: np.ndarray | None = array("Edges of a box.", "m", (3,), None, above=0.0)
-    radius: float | None = number("Of a sphere or cylinder.", "m", None, above=0.0)
-    height: float | None = number("Of a cylinder, along its z axis.", "m", None, above=0.0)
-    file: str | None = text(
-        "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its triangles must "
-        "enclose a volume where the inertia follows from it.",
-        None,
-    )
-    scale: float = number("Scale of a mesh, to metres.", "-", 1.0, above=0.0)
-    position: np.ndarray | None = array(
+    kind: Annotated[str, OneOf((BOX, SPHERE, CYLINDER, MESH)), "What it is."]
+    size: Annotated[np.ndarray | None, In("m", 3, gt=0.0), "Edges of a box."] = None
+    radius: Annotated[float | None, In("m", gt=0.0), "Of a sphere or cylinder."] = None
+    height: Annotated[float | None, In("m", gt=0.0), "Of a cylinder, along its z axis."] = None
+    file: Annotated[
+        Text | None,
+        "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its "
+        "triangles must enclose a volume where the inertia follows from it.",
+    ] = None
+    scale: Annotated[float, In("-", gt=0.0), "Scale of a mesh, to metres."] = 1.0
+    position: Annotated[
+        np.ndarray | None,
+        In("m", 3),
         "Its middle, or a mesh's origin, in P; null: the middle of the platform's box.",
-        "m",
-        (3,),
-        None,
-    )
-    angles_deg: np.ndarray = array(
-        "Angles (phi, theta, psi) of its axes, as of a pose.", "deg", (3,), (0.0, 0.0, 0.0)
-    )
+    ] = None
+    angles_deg: Annotated[
+        np.ndarray, In("deg", 3), "Angles (phi, theta, psi) of its axes, as of a pose."
+    ] = values(0.0, 0.0, 0.0)
 
     def missing(self) -> str:
         """The key that its kind needs and that is not there; empty: none."""
         if getattr(self, _NEEDS[self.kind]) is None:
             return _NEEDS[self.kind]
         return "height" if self.kind == CYLINDER and self.height is None else ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What its kind needs and is not there."""
+        missing, folder = self.missing(), (scope.path or Path()).parent
+        if missing:
+            yield missing, "null", f"a value, for the kind {self.kind}"
+        elif self.kind == MESH and mesh_path(str(self.file), folder) is None:
+            yield "file", self.file, f"an .obj or .gltf file, from {folder}"
 
     def pose(self, middle: Array) -> RigidTransform:
         """X_PS of the shape [m]; `middle` is that of the platform's box."""
@@ -225,15 +241,20 @@ def mesh_path(file: str, folder: Path) -> Path | None:
     return path if input_there(path) and path.suffix.lower() in MESH_SUFFIXES else None
 
 
-@dataclass(kw_only=True)
+@settings
 class FrameBeam:
     """A beam of the frame, of square section."""
 
-    start: np.ndarray = array("One end of its middle line in W.", "m", (3,))
-    end: np.ndarray = array("The other end.", "m", (3,))
-    width: float | None = number(
-        "Width; null: the thickness of the frame's beams.", "m", None, above=0.0
-    )
+    start: Annotated[Point, "One end of its middle line in W."]
+    end: Annotated[Point, "The other end."]
+    width: Annotated[
+        float | None, In("m", gt=0.0), "Width; null: the thickness of the frame's beams."
+    ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A beam without length."""
+        if not self.length() > 0.0:
+            yield "", "both ends in one point", "ends apart"
 
     def length(self) -> float:
         """From end to end [m]."""
@@ -257,26 +278,34 @@ BEAM_SHARE = 1.0 / 30.0
 """Thickness of a beam of the longest edge, as of ACROBOT, where a file does not give it."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Frame:
     """The robot's frame, a box of beams that the platform must stay in unless it was assumed."""
 
-    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
-    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    beam: float | None = number(
+    lower: Annotated[Point, "Lower corner in W."]
+    upper: Annotated[Point, "Upper corner in W."]
+    beam: Annotated[
+        float | None,
+        In("m", gt=0.0),
         "Thickness of the beams, for drawing; null: a share of the longest edge.",
-        "m",
-        None,
-        above=0.0,
-    )
-    beams: list[FrameBeam] = sections(
-        "Its beams, in the place of those on the edges of the box.", required=False
-    )
-    assumed: bool = switch(
-        "True if its corners were assumed, as the robot's source gives none. Such a frame bounds "
-        "default grids; it refuses no pose and limits no workspace hull.",
-        False,
-    )
+    ] = None
+    beams: Annotated[
+        list[FrameBeam], "Its beams, in the place of those on the edges of the box."
+    ] = filled(list)
+    assumed: Annotated[
+        Switch,
+        "True if its corners were assumed, as the robot's source gives none. Such a frame"
+        " bounds default grids; it refuses no pose and limits no workspace hull.",
+    ] = False
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A frame that nothing is inside of, and beams that are thicker than it is wide."""
+        smallest = float(np.min(self.upper - self.lower))
+        if smallest <= 0.0:
+            found = f"lower {number_words(self.lower)}, upper {number_words(self.upper)}"
+            yield "", found, "lower < upper"
+        elif self.beam is not None and self.beam > smallest:
+            yield "beam", f"{self.beam:g}", f"at most {smallest:g} [m], the frame's width"
 
     def bounds(self) -> tuple[Array, Array]:
         """Corners that Po must lie within, shape (3,) each [m]; infinite where it was assumed."""
@@ -293,67 +322,3 @@ class Frame:
 
 FITS = 1e-6
 """Share of its longest edge by which a shape may reach out of the platform's box: rounding."""
-
-
-def check_shapes(
-    path: Path,
-    shape: PlatformShape | None,
-    beams: list[FrameBeam],
-    *,
-    box: tuple[Array, Array],
-    mass: float | None,
-) -> None:
-    """Checks shapes, and makes the file of a mesh a path of its own.
-
-    Args:
-        path: The robot file.
-        shape: The platform's shape; None: its box.
-        beams: The frame's own beams.
-        box: Middle of the platform's box in P and its edges, shape (3,) each [m].
-        mass: The platform's [kg], where its inertia shall be that of the shape; None: it shall not.
-
-    Raises:
-        RobotFileError: Something is missing, not there, or reaches out of the platform's box.
-    """
-    problems = Problems(RobotFileError)
-
-    def fail(field: str, found: object, accepted: str) -> None:
-        problems.add(f"{path}: {field}: found {found}; accepted: {accepted}")
-
-    for index, beam in enumerate(beams):
-        if not beam.length() > 0.0:
-            fail(f"frame.beams[{index}]", "both ends in one point", "ends apart")
-    if shape is None:
-        if mass is not None:
-            fail("platform.inertia_of", "shape", "box, or a section platform.shape")
-        problems.raise_any()
-        return
-    missing = shape.missing()
-    if missing:
-        fail(f"platform.shape.{missing}", "null", f"a value, for the kind {shape.kind}")
-        problems.raise_any()
-    if shape.kind == MESH:
-        file = mesh_path(str(shape.file), path.parent)
-        if file is None:
-            accepted = f"an .obj or .gltf file, from {path.parent}"
-            fail("platform.shape.file", shape.file, accepted)
-            problems.raise_any()
-        shape.file = str(file)
-    lowest, highest = box[0] - box[1] / 2.0, box[0] + box[1] / 2.0
-    slack = FITS * float(np.max(box[1]))
-    with problems.collected():
-        lower, upper = shape.extent(box[0])
-        if np.any(lower < lowest - slack) or np.any(upper > highest + slack):
-            fail(
-                "platform.shape",
-                f"reaching from {_words(lower)} to {_words(upper)} m",
-                f"within the platform's box, {_words(lowest)} to {_words(highest)} m, with which "
-                "pulleys and clearances reckon",
-            )
-        if mass is not None:
-            shape.inertia(mass, box[0])
-    problems.raise_any()
-
-
-def _words(values: Array) -> str:
-    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"

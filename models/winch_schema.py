@@ -1,15 +1,12 @@
-"""The schema of the winches in a robot file.
+"""The schema of the winches in a robot file."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.fields import number, optional_section, section
+from cdpr_drake.schema.declarations import In, Refusal, Scope, filled, settings
 
 if TYPE_CHECKING:  # statics need no winches
     from cdpr_drake.winches.drum import Drum
@@ -18,23 +15,27 @@ if TYPE_CHECKING:  # statics need no winches
     from cdpr_drake.winches.motor import WinchLaw
 
 
-@dataclass(kw_only=True)
+@settings
 class Friction:
     """Friction of motor, gear and drum, at the motor's shaft; servoing thesis (5.7)."""
 
-    coulomb: float = number("Coulomb friction F_c.", "N m", at_least=0.0)
-    static: float = number("Static friction F_s, at least F_c.", "N m", at_least=0.0)
-    viscous: float = number("Viscous friction F_v.", "N m s/rad", 0.0, at_least=0.0)
-    stribeck_speed: float = number(
-        "Speed w_s over which static fades to Coulomb friction.", "rad/s", above=0.0
-    )
-    settling_time: float = number(
-        "Time in which a motor settles once friction can hold it; steps up to twice this are "
-        "stable.",
-        "s",
-        1e-3,
-        above=0.0,
-    )
+    coulomb: Annotated[float, In("N m", ge=0.0), "Coulomb friction F_c."]
+    static: Annotated[float, In("N m", ge=0.0), "Static friction F_s, at least F_c."]
+    viscous: Annotated[float, In("N m s/rad", ge=0.0), "Viscous friction F_v."] = 0.0
+    stribeck_speed: Annotated[
+        float, In("rad/s", gt=0.0), "Speed w_s over which static fades to Coulomb friction."
+    ]
+    settling_time: Annotated[
+        float,
+        In("s", gt=0.0),
+        "Time in which a motor settles once friction can hold it; steps up to twice this "
+        "are stable.",
+    ] = 0.001
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Static friction below Coulomb's."""
+        if self.static < self.coulomb:
+            yield "static", f"{self.static:g}", f"at least coulomb = {self.coulomb:g} [N m]"
 
     def law(self) -> "FrictionLaw":
         """The same for the pure functions."""
@@ -45,56 +46,55 @@ class Friction:
         )
 
 
-@dataclass(kw_only=True)
+@settings
 class DrumLayers:
     """Cable wound in layers; without this section the drum's radius does not change."""
 
-    turns: float = number("Turns in a layer; the last one climbs to the next.", "-", at_least=1.0)
-    height: float | None = number(
+    turns: Annotated[float, In("-", ge=1.0), "Turns in a layer; the last one climbs to the next."]
+    height: Annotated[
+        float | None,
+        In("m", ge=0.0),
         "Growth of the radius from layer to layer; null: the cable's diameter.",
-        "m",
-        None,
-        at_least=0.0,
-    )
-    wound: float = number("Line on the drum at the home pose.", "m", at_least=0.0)
+    ] = None
+    wound: Annotated[float, In("m", ge=0.0), "Line on the drum at the home pose."]
 
 
-@dataclass(kw_only=True)
+@settings
 class WinchLoops:
     """The inner loops of the drives."""
 
-    velocity_bandwidth: float = number("Of the speed loop.", "rad/s", 200.0, above=0.0)
-    position_bandwidth: float = number("Of the position loop around it.", "1/s", 20.0, above=0.0)
+    velocity_bandwidth: Annotated[float, In("rad/s", gt=0.0), "Of the speed loop."] = 200.0
+    position_bandwidth: Annotated[float, In("1/s", gt=0.0), "Of the position loop around it."] = (
+        20.0
+    )
 
 
-@dataclass(kw_only=True)
+@settings
 class Winch:
     """The winches; one kind for all cables of a robot.
 
     Radius, gear and rated speed suffice for ideal winches; those with motors need `inertia`.
     """
 
-    drum_radius: float = number("Radius of the drum.", "m", above=0.0)
-    gear_ratio: float = number("Motor turns per drum turn.", "-", above=0.0)
-    motor_speed_rpm: float = number("Rated speed of the motor.", "1/min", above=0.0)
-    motor_torque: float | None = number(
-        "Rated torque of the motor; null where unpublished.", "N m", None, above=0.0
-    )
-    inertia: float | None = number(
+    drum_radius: Annotated[float, In("m", gt=0.0), "Radius of the drum."]
+    gear_ratio: Annotated[float, In("-", gt=0.0), "Motor turns per drum turn."]
+    motor_speed_rpm: Annotated[float, In("1/min", gt=0.0), "Rated speed of the motor."]
+    motor_torque: Annotated[
+        float | None, In("N m", gt=0.0), "Rated torque of the motor; null where unpublished."
+    ] = None
+    inertia: Annotated[
+        float | None,
+        In("kg m^2", gt=0.0),
         "Moment of inertia of rotor, gear and drum, at the motor's shaft; null where unknown.",
-        "kg m^2",
-        None,
-        above=0.0,
-    )
-    friction: Friction | None = optional_section("Friction; null: none.")
-    layers: DrumLayers | None = optional_section("Layers of cable on the drum; null: one layer.")
-    brake_torque: float | None = number(
+    ] = None
+    friction: Annotated[Friction | None, "Friction; null: none."] = None
+    layers: Annotated[DrumLayers | None, "Layers of cable on the drum; null: one layer."] = None
+    brake_torque: Annotated[
+        float | None,
+        In("N m", gt=0.0),
         "What the holding brake holds at the motor's shaft; null: no brake.",
-        "N m",
-        None,
-        above=0.0,
-    )
-    loops: WinchLoops = section("Inner loops.", WinchLoops, required=False)
+    ] = None
+    loops: Annotated[WinchLoops, "Inner loops."] = filled(WinchLoops)
 
     def rated_motor_speed(self) -> float:
         """Rated speed of the motor [rad/s]."""

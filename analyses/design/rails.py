@@ -1,12 +1,9 @@
-"""Rails of exit points: files, robots that are put on them, and their coordinates.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+"""Rails of exit points: files, robots that are put on them, and their coordinates."""
 
 from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -14,28 +11,30 @@ from cdpr_drake.errors import DataFileError, PlanningError
 from cdpr_drake.models.exit_points import Rail
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.reconfiguration import Rails
-from cdpr_drake.schema.fields import array, number, sections, texts
+from cdpr_drake.schema.declarations import In, Text, filled, settings
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 from cdpr_drake.summaries import numbers
 
 
-@dataclass(kw_only=True)
+@settings
 class RailSettings:
     """A straight rail; exit points of several cables on it move together."""
 
-    cables: list[str] = texts("Cables that leave from it.")
-    axis: np.ndarray = array(
-        "Direction in W in which the coordinate grows; of any length.", "-", (3,)
-    )
-    lower: float = number("Smallest coordinate, counted from where the robot has its points.", "m")
-    upper: float = number("Largest coordinate.", "m")
+    cables: Annotated[list[Text], "Cables that leave from it."] = filled(list)
+    axis: Annotated[
+        np.ndarray, In("-", 3), "Direction in W in which the coordinate grows; of any length."
+    ]
+    lower: Annotated[
+        float, In("m"), "Smallest coordinate, counted from where the robot has its points."
+    ]
+    upper: Annotated[float, In("m"), "Largest coordinate."]
 
 
-@dataclass(kw_only=True)
+@settings
 class RailFile:
     """Rails that a robot file does not have."""
 
-    rails: list[RailSettings] = sections("The rails.")
+    rails: Annotated[list[RailSettings], "The rails."]
 
 
 def load_rails(path: Path) -> list[RailSettings]:

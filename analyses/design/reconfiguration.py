@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import pandas as pd
 from cyclopts import Parameter, Token
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.design.rails import load_rails, put_rails, rails_of
@@ -51,6 +50,7 @@ from cdpr_drake.planning.reconfiguration import (
     tension_margins,
 )
 from cdpr_drake.planning.resistance import wrench_words
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
 from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
 from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
@@ -227,7 +227,7 @@ class Reconfiguration(Result):
 
     def write(self, folder: Folder) -> None:
         """Writes the robot file and the summary."""
-        folder.write_text(ROBOT_FILE, yaml_dump_typed(self.after))
+        folder.write_text(ROBOT_FILE, dump_typed(self.after))
         load_robot(str(folder.path / ROBOT_FILE))
         folder.write_json(SUMMARY, self.as_dict())
 

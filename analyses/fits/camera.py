@@ -27,7 +27,7 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.errors import CameraCalibrationError
 from cdpr_drake.models.camera_calibrations import RATE
-from cdpr_drake.models.camera_catalogue import Camera, Distortion, fold_problem
+from cdpr_drake.models.camera_catalogue import Camera, Distortion, fold_refusals
 from cdpr_drake.vision.calibration_boards import BOARDS, CalibrationBoard
 from cdpr_drake.vision.camera_fit import (
     CELLS,
@@ -263,7 +263,7 @@ def _remarks(fit: CameraFit, empty: Sequence[str]) -> list[str]:
         return ", ".join(f"{view.name} ({view.rms:.2f} px)" for view in views)
 
     outliers, far = named("outlier", -1.0), named("held out", max(OUTLIER * fitted, LEAST_OUTLIER))
-    fold = fold_problem(fit.camera)
+    fold = "".join(str(found) for _, found, _ in fold_refusals(fit.camera, ""))
     remarks = {
         "no board was found in " + ", ".join(empty): empty,
         f"left out, since they fit far worse than the others: {outliers}": outliers,

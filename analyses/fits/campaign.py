@@ -16,7 +16,6 @@ from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from cyclopts import Parameter
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.fits.calibration import (
@@ -64,6 +63,7 @@ from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.systems.cameras.camera_settings import servo_pinhole
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
@@ -397,7 +397,7 @@ def _campaign_fit(
     def believing(folder: Path) -> Scenario:
         """The servo that believes in the calibrated robot, from its file in a folder."""
         file = folder / BELIEVED_FILE
-        file.write_text(yaml_dump_typed(fit.model), encoding="utf-8")
+        file.write_text(dump_typed(fit.model), encoding="utf-8")
         return calibrated_scenario(scene, recorded, calibration, str(file))
 
     def write(folder: Path) -> None:

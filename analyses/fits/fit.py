@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
 from cdpr_drake.analyses.frame.follow import Follow
@@ -21,6 +20,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CalibrationError, IdentificationError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.time_shift import WORSE
+from cdpr_drake.schema.typed_yaml import dump_typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -174,7 +174,7 @@ class Fit(Result):
     def write(self, folder: Folder) -> None:
         """Writes numbers, the fitted model and further files."""
         folder.write_json(RESULTS, self.as_dict())
-        folder.write_text(self.model_file, yaml_dump_typed(self.model))
+        folder.write_text(self.model_file, dump_typed(self.model))
         for name, words in self.texts.items():
             folder.write_text(name, words)
         if self.writer is not None:

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import Parameter
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.fits.campaign import BEFORE, TRUE, campaign_scenario, in_turn
@@ -59,6 +58,7 @@ from cdpr_drake.models.materials import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.loops.motor_tracking import MotorTracking, TrackingSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -251,9 +251,9 @@ def _campaign_fit(campaign: DynamicCampaign) -> Fit:
         [tracking], details={"campaign": numbers},
         drawings={"tracking": lambda: _tracking_figure(campaign)},
         texts={
-            TRUE_FILE: yaml_dump_typed(campaign.true),
-            BELIEVED_FILE: yaml_dump_typed(campaign.believed),
-            SCENARIO_FILE: yaml_dump_typed(_excitation_scenario(campaign)),
+            TRUE_FILE: dump_typed(campaign.true),
+            BELIEVED_FILE: dump_typed(campaign.believed),
+            SCENARIO_FILE: dump_typed(_excitation_scenario(campaign)),
         },
     )  # fmt: skip
     return replace(fit, writer=write, source=campaign)

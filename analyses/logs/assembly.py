@@ -33,7 +33,7 @@ from cdpr_drake.analyses.logs.columns import (
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal, same_as_before
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import LogFileError
-from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.declarations import LARGEST
 from cdpr_drake.schema.input_files import file_size
 
 MOST_BYTES = 500_000_000

@@ -7,14 +7,13 @@ import math
 from pathlib import Path
 from typing import Any
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.schema.typed_yaml import dump_typed
 
 
 def write_scenario(path: Path, scenario: object) -> None:
     """Writes the scenario as it was run, overrides included, so that it can be run again."""
-    write_whole(path, yaml_dump_typed(scenario))
+    write_whole(path, dump_typed(scenario))
 
 
 def write_json(path: Path, found: dict[str, Any]) -> None:

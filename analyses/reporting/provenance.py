@@ -18,18 +18,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from cdpr_drake.analyses.reporting.log_files import write_scenario, write_whole
 from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.models.camera_files import CAMERA_SUFFIXES
-from cdpr_drake.models.mechanism_in_plant import MODEL_SUFFIXES
 from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.mechanism_schema import MODEL_SUFFIXES
 from cdpr_drake.models.robot_copies import portable_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_bytes
-from cdpr_drake.schema.yaml_files import plain_values
+from cdpr_drake.schema.typed_yaml import dump_typed, plain_values
 from cdpr_drake.version import __version__
 
 PACKAGES = ("cdpr_drake", "cdpr_drake.models", "cdpr_drake.systems", "cdpr_drake.analyses")
@@ -135,7 +133,7 @@ def write_mechanism(folder: Path, name: str) -> str:
 
     It names the files of its bodies and packages where they are: on another machine they are not.
     """
-    write_whole(folder / MECHANISM_FILE, yaml_dump_typed(load_mechanism(name)))
+    write_whole(folder / MECHANISM_FILE, dump_typed(load_mechanism(name)))
     return MECHANISM_FILE
 
 
@@ -154,7 +152,7 @@ def _write(path: Path, robot: Robot) -> str:
     portable, files = portable_robot(robot)
     for file in files:
         _copy(file, path.parent / file.name)
-    write_whole(path, yaml_dump_typed(portable))
+    write_whole(path, dump_typed(portable))
     return path.name
 
 

@@ -34,7 +34,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from cdpr_drake.palette import Look
-from cdpr_drake.schema.yaml_files import plain_values
+from cdpr_drake.schema.typed_yaml import plain_values
 from cdpr_drake.systems.diagrams.mechanism_control import (
     MechanismFollower,
     build_mechanism_follower,

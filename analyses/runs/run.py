@@ -54,7 +54,7 @@ from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.schema.input_files import input_bytes
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.schema.yaml_files import plain_values
+from cdpr_drake.schema.typed_yaml import plain_values
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
 

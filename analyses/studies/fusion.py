@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.frame.figures import bar_style, line_style, new_figure
 from cdpr_drake.analyses.runs.servo import ServoRun
@@ -24,6 +23,7 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import logarithm, pose_from_row, pose_rows_distance
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.palette import BOUND, SHADED, nth_look
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
@@ -435,7 +435,7 @@ STUDY = Study(
     source="servoing thesis, perspectives",
     cases=cases,
     coarse=True,
-    parameters=lambda form: {"scenario": yaml_dump_typed(load_scenario(SCENARIO))},
+    parameters=lambda form: {"scenario": dump_typed(load_scenario(SCENARIO))},
     assumptions=(
         "Nothing of this is printed but that it could be done. Where the tag on the platform is, "
         "its size, the noise of 0.3 px and that the camera in the world is one image late are "

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.frame.figures import (
     bar_style,
@@ -34,6 +33,7 @@ from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot, robot_reference
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, SHADED, nth_look
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.loops.loop_choice import choose_compiled_loop
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
@@ -724,7 +724,7 @@ STUDY = Study(
     source="servoing thesis 2.3.7, 5.3.1",
     cases=cases,
     coarse=True,
-    parameters=lambda form: {"scenario": yaml_dump_typed(load_scenario(SCENARIO))},
+    parameters=lambda form: {"scenario": dump_typed(load_scenario(SCENARIO))},
     numbers=worst_of_all,
     finds={"spikes": spikes, "lengths_depend": lengths_depend, "view_decides": view_decides},
     tables={"A tag on a mobile robot": outcomes},

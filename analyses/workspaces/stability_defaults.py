@@ -1,10 +1,8 @@
-"""Where a robot's stability is asked for, and under which perturbations, as data.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+"""Where a robot's stability is asked for, and under which perturbations, as data."""
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BoundsFileError
 from cdpr_drake.models.robot_loader import robot_file, robot_names
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import array, number, section, text
+from cdpr_drake.schema.declarations import In, OneOf, Text, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 from cdpr_drake.servoing.turned_view import encoder_turn
 from cdpr_drake.stability.perturbation_bounds import (
@@ -32,33 +30,35 @@ COUNTS = (17, 17, 9)
 """Without such a file the grid has so many points along x, y, z."""
 
 
-TURN = {"at_least": 0.0, "at_most": 180.0}
+Turn = Annotated[float, In("deg", ge=0.0, le=180.0)]
+"""An angle without a sign."""
 
 
-@dataclass(kw_only=True)
+@settings
 class BoundsSettings:
     """Bounds on the error between true and believed model; what is left out is known exactly."""
 
-    source: str = text("Where the values stand.", "")
-    r_bp: float = number("Position of the platform.", "m", 0.0, at_least=0.0)
-    d_theta_bp_deg: float = number("Orientation of the platform.", "deg", 0.0, **TURN)
-    r_pc: float = number("Position of the camera on the platform.", "m", 0.0, at_least=0.0)
-    d_theta_pc_deg: float = number("Orientation of the camera on the platform.", "deg", 0.0, **TURN)
-    r_A: float = number("Exit points.", "m", 0.0, at_least=0.0)
-    r_B: float = number("Anchor points.", "m", 0.0, at_least=0.0)
-    r_s: float = number("Position of the object seen by the camera.", "m", 0.0, at_least=0.0)
-    d_theta_s_deg: float = number(
-        "Orientation of the object seen by the camera.", "deg", 0.0, **TURN
-    )
-    encoders_deg: np.ndarray = array(
-        "Encoders of the joints, pan and tilt, of a camera that turns on such.", "deg", (2,),
-        (0.0, 0.0), at_least=0.0,
-    )  # fmt: skip
-    exits: str = text(
-        "How exit points are wrong: each by itself in a ball, all by one common shift, or each in "
-        "a cube.", "independent", choices=DIRECTIONS,
-    )  # fmt: skip
-    anchors: str = text("The same for anchor points.", "independent", choices=DIRECTIONS)
+    source: Annotated[Text, "Where the values stand."] = ""
+    r_bp: Annotated[float, In("m", ge=0.0), "Position of the platform."] = 0.0
+    d_theta_bp_deg: Annotated[Turn, "Orientation of the platform."] = 0.0
+    r_pc: Annotated[float, In("m", ge=0.0), "Position of the camera on the platform."] = 0.0
+    d_theta_pc_deg: Annotated[Turn, "Orientation of the camera on the platform."] = 0.0
+    r_A: Annotated[float, In("m", ge=0.0), "Exit points."] = 0.0
+    r_B: Annotated[float, In("m", ge=0.0), "Anchor points."] = 0.0
+    r_s: Annotated[float, In("m", ge=0.0), "Position of the object seen by the camera."] = 0.0
+    d_theta_s_deg: Annotated[Turn, "Orientation of the object seen by the camera."] = 0.0
+    encoders_deg: Annotated[
+        np.ndarray,
+        In("deg", 2, ge=0.0),
+        "Encoders of the joints, pan and tilt, of a camera that turns on such.",
+    ] = values(0.0, 0.0)
+    exits: Annotated[
+        str,
+        OneOf(DIRECTIONS),
+        "How exit points are wrong: each by itself in a ball, all by one common shift, or"
+        " each in a cube.",
+    ] = "independent"
+    anchors: Annotated[str, OneOf(DIRECTIONS), "The same for anchor points."] = "independent"
 
     def bounds(self) -> PerturbationBounds:
         """The bounds in SI units."""
@@ -73,22 +73,22 @@ class BoundsSettings:
         )
 
 
-@dataclass(kw_only=True)
+@settings
 class GridSettings:
     """A box of positions of the platform."""
 
-    lower: np.ndarray = array("Lower corner in W.", "m", (3,))
-    upper: np.ndarray = array("Upper corner in W.", "m", (3,))
-    step: np.ndarray = array("Distance between neighbours along x, y, z.", "m", (3,), above=0.0)
+    lower: Annotated[np.ndarray, In("m", 3), "Lower corner in W."]
+    upper: Annotated[np.ndarray, In("m", 3), "Upper corner in W."]
+    step: Annotated[np.ndarray, In("m", 3, gt=0.0), "Distance between neighbours along x, y, z."]
 
 
-@dataclass(kw_only=True)
+@settings
 class WorkspaceSettings:
     """Grid and bounds of a robot."""
 
-    source: str = text("Where the values stand.", "")
-    grid: GridSettings = section("Places of the platform.", GridSettings)
-    bounds: BoundsSettings = section("Perturbation bounds.", BoundsSettings)
+    source: Annotated[Text, "Where the values stand."] = ""
+    grid: Annotated[GridSettings, "Places of the platform."]
+    bounds: Annotated[BoundsSettings, "Perturbation bounds."]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,7 @@
-"""Sets of wrenches and obstacles as users write them.
+"""Sets of wrenches and obstacles as users write them."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -22,18 +18,9 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import (
-    array,
-    number,
-    optional_section,
-    section,
-    sections,
-    switch,
-    text,
-)
+from cdpr_drake.schema.declarations import In, Scope, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
-from cdpr_drake.systems.worlds.checks import motion_problems
-from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion
+from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion, way_back_refusals
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 from cdpr_drake.trajectories.sampled_motion import read_motion, sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
@@ -46,83 +33,85 @@ MOTION = "How it moves, as a body of a scenario's world does; null: it rests."
 """Documentation of the section of obstacles that move."""
 
 
-@dataclass(kw_only=True)
+@settings
 class WrenchSetFile:
     """Wrenches about Po in W: every sum of one of the polytope, the box and the ellipsoid."""
 
-    vertices: np.ndarray = array(
-        "Vertices of a polytope, moments then forces.", "N m, N", (None, 6), np.zeros((1, 6))
+    vertices: Annotated[
+        np.ndarray, In("N m, N", None, 6), "Vertices of a polytope, moments then forces."
+    ] = values(*np.zeros((1, 6)))
+    box: Annotated[np.ndarray, In("N m, N", 6, ge=0.0), "Half widths of a box."] = values(
+        *np.zeros(6)
     )
-    box: np.ndarray = array("Half widths of a box.", "N m, N", (6,), np.zeros(6), at_least=0.0)
-    ellipsoid: np.ndarray = array(
-        "Semi-axes of an ellipsoid.", "N m, N", (6,), np.zeros(6), at_least=0.0
+    ellipsoid: Annotated[np.ndarray, In("N m, N", 6, ge=0.0), "Semi-axes of an ellipsoid."] = (
+        values(*np.zeros(6))
     )
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleBox:
     """A box that stands in the robot's frame."""
 
-    pose: Pose = section("Pose of its middle in W.", Pose)
-    size: np.ndarray = array("Its edges.", "m", (3,), above=0.0)
-    motion: ObstacleMotion | None = optional_section(MOTION)
+    pose: Annotated[Pose, "Pose of its middle in W."]
+    size: Annotated[np.ndarray, In("m", 3, gt=0.0), "Its edges."]
+    motion: Annotated[ObstacleMotion | None, MOTION] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleSphere:
     """A ball that stands in the robot's frame."""
 
-    position: np.ndarray = array("Its middle in W.", "m", (3,))
-    radius: float = number("Its radius.", "m", above=0.0)
-    motion: ObstacleMotion | None = optional_section(MOTION)
+    position: Annotated[np.ndarray, In("m", 3), "Its middle in W."]
+    radius: Annotated[float, In("m", gt=0.0), "Its radius."]
+    motion: Annotated[ObstacleMotion | None, MOTION] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleCapsule:
     """What is within a radius of a line in the robot's frame."""
 
-    start: np.ndarray = array("One end of the line in W.", "m", (3,))
-    end: np.ndarray = array("The other.", "m", (3,))
-    radius: float = number("The radius.", "m", above=0.0)
-    motion: ObstacleMotion | None = optional_section(
-        MOTION + " Its frame is in the middle of the line, along W."
-    )
+    start: Annotated[np.ndarray, In("m", 3), "One end of the line in W."]
+    end: Annotated[np.ndarray, In("m", 3), "The other."]
+    radius: Annotated[float, In("m", gt=0.0), "The radius."]
+    motion: Annotated[
+        ObstacleMotion | None, MOTION + " Its frame is in the middle of the line, along W."
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleMesh:
     """The convex hull of a mesh that stands in the robot's frame."""
 
-    file: str = text("Mesh in metres, beside this file: .obj; .stl and .ply with trimesh.")
-    pose: Pose = section("Pose of the mesh in W.", Pose)
-    scale: float = number("What its coordinates are multiplied by.", "-", 1.0, above=0.0)
-    motion: ObstacleMotion | None = optional_section(MOTION)
+    file: Annotated[Text, "Mesh in metres, beside this file: .obj; .stl and .ply with trimesh."]
+    pose: Annotated[Pose, "Pose of the mesh in W."]
+    scale: Annotated[float, In("-", gt=0.0), "What its coordinates are multiplied by."] = 1.0
+    motion: Annotated[ObstacleMotion | None, MOTION] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class OtherRobot:
     """Another robot in the same room, which moves as was planned for it, or rests."""
 
-    robot: str = text("Its name, or its file, beside this one or in the working folder.")
-    pose: Pose = section("Pose of its W in this robot's W.", Pose)
-    plan: str | None = text(
-        "Folder that cdpr plan wrote for it, or a table as its motion.csv, beside this file; null: "
-        "it rests at home.",
-        None,
-    )
-    later: float = number("How much later than its plan says it starts.", "s", 0.0, at_least=0.0)
-    beams: bool = switch("Whether the beams of its frame stand there, too.", True)
+    robot: Annotated[Text, "Its name, or its file, beside this one or in the working folder."]
+    pose: Annotated[Pose, "Pose of its W in this robot's W."]
+    plan: Annotated[
+        Text | None,
+        "Folder that cdpr plan wrote for it, or a table as its motion.csv, beside this "
+        "file; null: it rests at home.",
+    ] = None
+    later: Annotated[float, In("s", ge=0.0), "How much later than its plan says it starts."] = 0.0
+    beams: Annotated[Switch, "Whether the beams of its frame stand there, too."] = True
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleFile:
     """What cables and platform may not touch."""
 
-    boxes: list[ObstacleBox] = sections("Boxes.", required=False)
-    spheres: list[ObstacleSphere] = sections("Balls.", required=False)
-    capsules: list[ObstacleCapsule] = sections("Capsules.", required=False)
-    meshes: list[ObstacleMesh] = sections("Convex hulls of meshes.", required=False)
-    robots: list[OtherRobot] = sections("Other robots, with their plans.", required=False)
+    boxes: Annotated[list[ObstacleBox], "Boxes."] = filled(list)
+    spheres: Annotated[list[ObstacleSphere], "Balls."] = filled(list)
+    capsules: Annotated[list[ObstacleCapsule], "Capsules."] = filled(list)
+    meshes: Annotated[list[ObstacleMesh], "Convex hulls of meshes."] = filled(list)
+    robots: Annotated[list[OtherRobot], "Other robots, with their plans."] = filled(list)
 
 
 def load_wrench_set(path: Path) -> SpatialSet:
@@ -171,7 +160,7 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
     """
     if not path.is_file():
         raise DataFileError(f"{path}: there is no such file of obstacles")
-    content = load_typed(ObstacleFile, path)
+    content = load_typed(ObstacleFile, path, scope=lambda content: Scope(content, path))
     if not any((content.boxes, content.spheres, content.capsules, content.meshes, content.robots)):
         raise DataFileError(
             f"{path}: found no obstacle; accepted: some of boxes, spheres, capsules, meshes, robots"
@@ -185,8 +174,8 @@ def load_all_obstacles(path: Path) -> tuple[Obstacles, tuple[MovingObstacle, ...
         if motion is None:
             solids.append(shape.moved(X_WS))
             return
-        for problem in motion_problems(X_WS, motion, f"{key}.motion"):
-            raise DataFileError(f"{path}: {problem}")
+        for inner, found, accepted in way_back_refusals(X_WS, motion):
+            raise DataFileError(f"{path}: {key}.{inner}: found {found}; accepted: {accepted}")
         moving.append(MovingShape(shape, body_motion(X_WS, motion), key))
 
     for k, box in enumerate(content.boxes):

@@ -1,109 +1,102 @@
-"""JSON schemas of YAML files, for editors that complete and check while one types.
+"""What files of a class of settings may say: a JSON schema for editors, and a file to start from.
 
 Source: JSON Schema 2020-12.
 """
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Iterator, Mapping
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
+import yaml
 
-from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
+_WIDTH = 100
+
 
 def json_schema(schema: type, title: str) -> dict[str, Any]:
-    """The JSON schema of a dataclass whose fields were made by `fields`.
-
-    Args:
-        schema: The dataclass.
-        title: What files of it are, in words.
-    """
+    """The JSON schema of a class of settings; `title` says what files of it are, in words."""
     return {"$schema": DIALECT, "title": title, **_object(schema)}
 
 
 def _object(schema: type) -> dict[str, Any]:
-    rules = rules_of(schema)
-    defaults = {field.name: _default(field) for field in dataclasses.fields(schema)}
-    properties = {}
-    for name, (rule, bare) in rules.items():
-        properties[name] = _property(rule, bare)
-        if not rule.required and rule.kind not in ("section", "sections"):
-            properties[name]["default"] = defaults[name]
+    known = settings_of(schema)
     return {
         "type": "object",
-        "properties": properties,
-        "required": [name for name, (rule, _) in rules.items() if rule.required],
+        "properties": {name: _property(setting) for name, setting in known.items()},
+        "required": [name for name, setting in known.items() if setting.required],
         "additionalProperties": False,
     }
 
 
-def _default(field: dataclasses.Field[Any]) -> Any:
-    value = field.default
-    if field.default_factory is not dataclasses.MISSING:
-        value = field.default_factory()
+def _property(setting: Setting) -> dict[str, Any]:
+    made = setting.rule.json(setting.type) if setting.rule else _object(setting.section)
+    if setting.many is list:
+        made = {"type": "array", "items": made}
+    elif setting.many is dict:
+        made = {"type": "object", "additionalProperties": made}
+    if setting.nullable:
+        made = {"anyOf": [made, {"type": "null"}]}
+    unit = f" [{setting.unit}]" if setting.unit else ""
+    made = {"description": f"{setting.doc}{unit}", **made}
+    if not setting.required and setting.kind not in ("section", "sections"):
+        made["default"] = _default(setting)
+    return made
+
+
+def _default(setting: Setting) -> Any:
+    value = setting.default
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _property(rule: FieldRule, bare: Any) -> dict[str, Any]:
-    if rule.kind == "section":
-        made = _object(bare)
-    elif rule.kind == "sections":
-        made = {"type": "array", "items": _object(bare)}
-    elif rule.kind == "named_sections":
-        made = {"type": "object", "additionalProperties": _object(bare)}
-    elif rule.kind == "named_texts":
-        made = {"type": "object", "additionalProperties": {"type": "string"}}
-    elif rule.kind == "named_numbers":
-        one = _number(rule)
-        several = {"type": "array", "items": one, "minItems": 1}
-        made = {"type": "object", "additionalProperties": {"anyOf": [one, several]}}
-    elif rule.kind == "texts":
-        made = {"type": "array", "items": _text(rule)}
-    elif rule.kind == "text":
-        made = _text(rule)
-    elif rule.kind == "switch":
-        made = {"type": "boolean"}
-    elif rule.kind == "array":
-        made = _numbers(rule, rule.shape)
-    else:
-        made = _number(rule)
-    if rule.nullable:
-        made = {"anyOf": [made, {"type": "null"}]}
-    unit = f" [{rule.unit}]" if rule.unit else ""
-    return {"description": f"{rule.doc}{unit}", **made}
+def commented_yaml(schema: type, content: Mapping[str, Any], every: bool = True) -> str:
+    """Content of a file with a comment on each of its keys, and the keys that it lacks as comments.
+
+    Args:
+        schema: Class of settings.
+        content: Keys of the file, as YAML gives them.
+        every: False to leave out the keys that the content lacks.
+    """
+    return "\n".join(_lines(schema, content, "", every)) + "\n"
 
 
-def _text(rule: FieldRule) -> dict[str, Any]:
-    made: dict[str, Any] = {"type": "string"}
-    if rule.choices:
-        made["enum"] = list(rule.choices)
-    if rule.pattern:
-        made["pattern"] = f"^{rule.pattern}$"
-    return made
+def _lines(schema: type, content: Mapping[str, Any], pad: str, every: bool) -> Iterator[str]:
+    for name, setting in settings_of(schema).items():
+        if not every and name not in content:
+            continue
+        words, value = setting.doc, content.get(name)
+        if setting.kind not in ("section", "sections"):
+            accepts = setting.accepts().rstrip(".")
+            words += f" {accepts[:1].upper()}{accepts[1:]}."
+        yield from wrap(words, _WIDTH, initial_indent=f"{pad}# ", subsequent_indent=f"{pad}#   ",
+                        break_long_words=False, break_on_hyphens=False)  # fmt: skip
+        if setting.kind == "section":
+            yield f"{pad}{'# ' if value is None else ''}{name}:"
+            yield from _lines(setting.section, value or {}, f"{pad}  ", every)
+        elif name not in content:
+            yield f"{pad}# {name}: {'...' if setting.required else _flow(_default(setting))}"
+        elif setting.kind == "sections" and value:
+            yield f"{pad}{name}:"
+            if every:
+                yield from (f"{pad}  # {line}" for line in _keys(setting.section))
+            yield from (f"{pad}  - {_flow(item)}" for item in value)
+        else:
+            yield f"{pad}{name}: {_flow(value)}"
 
 
-def _number(rule: FieldRule) -> dict[str, Any]:
-    bounds = {
-        "exclusiveMinimum": rule.above,
-        "minimum": rule.at_least,
-        "exclusiveMaximum": rule.below,
-        "maximum": rule.at_most,
-    }
-    kind = "integer" if rule.kind == "whole" else "number"
-    return {"type": kind} | {key: value for key, value in bounds.items() if value is not None}
+def _keys(schema: type) -> Iterator[str]:
+    for name, setting in settings_of(schema).items():
+        unit = f" [{setting.unit}]" if setting.unit not in ("", "-") else ""
+        yield f"{name}: {setting.doc}{unit}"
 
 
-def _numbers(rule: FieldRule, shape: tuple[int | None, ...]) -> dict[str, Any]:
-    if not shape:
-        return _number(rule)
-    made: dict[str, Any] = {"type": "array", "items": _numbers(rule, shape[1:])}
-    least, most = (1, None) if shape[0] is None else (shape[0], shape[0])
-    made["minItems"] = least
-    if most is not None:
-        made["maxItems"] = most
-    return made
+def _flow(value: Any) -> str:
+    words = yaml.safe_dump(
+        value, default_flow_style=True, sort_keys=False, width=10_000, allow_unicode=True
+    )
+    return words.removesuffix("\n").removesuffix("\n...")

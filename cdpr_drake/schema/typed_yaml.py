@@ -1,7 +1,7 @@
-"""Reads a YAML file into a dataclass schema, with errors that name file, line, field and range.
+"""Reads YAML files into settings, and says every problem with file, line and key.
 
-Drake's `yaml_load_typed` does the conversion. It neither reports lines nor ranges nor missing
-fields, so the YAML nodes are checked against the rules of `fields` first.
+PyYAML knows lines, pydantic checks values, their rules say in words what they may be, and sections
+refuse what no single field can tell.
 """
 
 from __future__ import annotations
@@ -9,70 +9,35 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-import types
-import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
+import numpy as np
 import yaml
 
 from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
-from cdpr_drake.schema.fields import NAMED, FieldRule
+from cdpr_drake.schema.declarations import Scope, Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (
     YamlTextError,
-    cached_yaml,
     compose_yaml,
     other_kind,
     too_many_bytes,
     too_many_nodes,
 )
 
-
-def printable(words: str) -> str:
-    """The words as they are, or quoted with escapes where they would break the line."""
-    return words if words.isprintable() else repr(words)
-
-
-def show(node: yaml.Node) -> str:
-    """A node as it could stand in a file, cut to 60 characters."""
-    if isinstance(node, yaml.ScalarNode):
-        words = printable(str(node.value)) or "nothing"
-    elif too_many_nodes(node):
-        words = "very many values"
-    else:
-        words = printable(_flow(node))
-    return words if len(words) <= 60 else words[:57] + "..."
-
-
-def _flow(node: yaml.Node) -> str:
-    if isinstance(node, yaml.SequenceNode):
-        return "[" + ", ".join(_flow(child) for child in node.value) + "]"
-    if isinstance(node, yaml.MappingNode):
-        return "{" + ", ".join(f"{_flow(k)}: {_flow(v)}" for k, v in node.value) + "}"
-    return str(node.value)
-
-
 T = TypeVar("T")
 
-_TAG = "tag:yaml.org,2002:"
-_NULL_TAG = _TAG + "null"
-_BOOLEANS = yaml.SafeLoader.bool_values
+Place = tuple[str | int, ...]
+"""Keys and indices that lead to a value of a file."""
 
-_SCALARS = frozenset(_TAG + name for name in ("str", "int", "float", "bool", "null", "timestamp",
-                                              "value", "merge"))  # fmt: skip
+_TAG = "tag:yaml.org,2002:"
+_SCALARS = frozenset({"str", "int", "float", "bool", "null", "timestamp", "value", "merge"})
 """What YAML takes plain words for; another tag was written there."""
 
-_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-"""What controls a terminal and no figure can draw; ends of lines and tabs are text."""
-
-
-def closest(name: str, known: Iterable[str]) -> str:
-    """Words that help after an unknown name: the likely one, then all that exist."""
-    names = list(known)
-    hint = "".join(f"did you mean {likely}? " for likely in meant_names(name, names))
-    return f"{hint}known: {', '.join(names)}"
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
 
 def load_typed(
@@ -81,19 +46,22 @@ def load_typed(
     *,
     error: type[DataFileError] = DataFileError,
     overrides: Sequence[str] = (),
+    scope: Callable[[T], Scope] | None = None,
 ) -> T:
-    """Reads `path` into an instance of the dataclass `schema`.
+    """Reads a file into settings.
 
     Args:
-        schema: Dataclass whose fields were made by `fields`.
+        schema: Class made by `settings`.
         path: YAML file.
         error: Class of the error to raise.
         overrides: Items "key.subkey=value" that replace what the file says; the value is YAML.
+        scope: Says what is round the settings once they are read, and may complete them; None:
+            nothing is, and their `refusals` are not asked.
 
     Raises:
         error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
-            shape, is not finite or lies outside the accepted range. It has every such problem of
-            the file and the overrides.
+            shape, is not finite or lies outside the accepted range; or sections refuse what they
+            say together. It has every such problem of the file and the overrides.
     """
     try:
         large = too_many_bytes(path)
@@ -102,7 +70,7 @@ def load_typed(
         content = input_text(path)
     except (OSError, UnicodeDecodeError) as problem:
         raise error(f"{path}: cannot be read: {why_not_read(problem)}") from problem
-    return parse_typed(schema, content, path, error=error, overrides=overrides)
+    return parse_typed(schema, content, path, error=error, overrides=overrides, scope=scope)
 
 
 def parse_typed(
@@ -112,313 +80,365 @@ def parse_typed(
     *,
     error: type[DataFileError] = DataFileError,
     overrides: Sequence[str] = (),
+    scope: Callable[[T], Scope] | None = None,
+    lines: bool = True,
 ) -> T:
     """As `load_typed`, of YAML that is there already.
 
     Args:
-        schema: Dataclass whose fields were made by `fields`.
+        schema: As for `load_typed`.
         content: The YAML.
         path: The file that messages name.
-        error: Class of the error to raise.
+        error: As for `load_typed`.
         overrides: As for `load_typed`.
+        scope: As for `load_typed`.
+        lines: Whether the YAML is what stands in that file, so that messages name its lines.
 
     Raises:
         error: As `load_typed`.
     """
-    known = cached_yaml(schema, content, edited=bool(overrides))
-    keys = rules_of(typing.cast(type, schema))
+    known = settings_of(schema)
     try:
-        root = known.nodes()
+        root = _nodes(content)
     except YamlTextError as problem:
         raise error(problem.at(path)) from problem
     if not isinstance(root, yaml.MappingNode):
-        raise error(f"{path}: found no mapping at the top; accepted: the keys {', '.join(keys)}")
-    elsewhere = other_kind([str(key.value) for key, _ in root.value], keys)
+        raise error(f"{path}: found no mapping at the top; accepted: the keys {', '.join(known)}")
+    elsewhere = other_kind([str(key.value) for key, _ in root.value], known)
     if elsewhere:
         raise error(f"{path}: {elsewhere}")
-    origins: dict[int, str] = {}
-    problems = Problems(error)
+    problems = _Problems(error, path, root if lines else None)
+    data = _words(root, problems, ())
+    problems.data, problems.schema = data, schema
+    for item in overrides:
+        _override(schema, data, item, problems)
+    from pydantic import ValidationError
+
     try:
-        for item in overrides:
-            try:
-                origin, node = _override(schema, root, item, error)
-            except error as problem:
-                problems.add(*problem.problems)
-            else:
-                _mark_origin(node, origin, origins)
-        _Checker(path, problems, origins).section(schema, root, "")
+        made: T = _adapter(cast(Any, schema)).validate_python(data)
+    except ValidationError as problem:
+        problems.add_all(problem.errors(include_url=False, include_context=False))
+    problems.raise_any()
+    if scope is not None:
+        problems.add_refusals(made, scope(made))
         problems.raise_any()
-        return typing.cast(T, known.instance())
-    except BaseException as problem:
-        known.forget()
-        if isinstance(problem, RecursionError):
-            words = "nested too deeply, or an anchor that contains itself"
-            raise error(f"{path}: {words}") from problem
-        raise
+    return made
 
 
-_RULES: dict[type, dict[str, tuple[FieldRule, Any]]] = {}
+def refuse(
+    settings: Any,
+    key: str = "",
+    *,
+    path: Path | None = None,
+    robot: Any = None,
+    error: type[DataFileError] = DataFileError,
+) -> None:
+    """Raises what settings refuse that were made by code, or from a file of another tool.
 
+    Args:
+        settings: The settings.
+        key: The key of a section in a file, for the message.
+        path: File for the message.
+        robot: The robot that a section is for, if it asks for one.
+        error: Class of the error to raise.
 
-def rules_of(schema: type) -> dict[str, tuple[FieldRule, Any]]:
-    """The fields of a schema, each with its rule and the type inside Optional and list.
-
-    Found once for each schema, and not to be changed: what its types are called is looked up by
-    `typing.get_type_hints`, which takes half of the time of a file that was read before.
+    Raises:
+        error: With every refusal.
     """
-    if schema not in _RULES:
-        hints, fields = typing.get_type_hints(schema), dataclasses.fields(schema)
-        found = {f.name: (f.metadata["rule"], _bare_type(hints[f.name])) for f in fields}
-        _RULES[schema] = found
-    return _RULES[schema]
+    problems = _Problems(error, path, None)
+    problems.add_refusals(settings, Scope(settings, path, robot), (key,) if key else ())
+    problems.raise_any()
 
 
-def _bare_type(hint: Any) -> Any:
-    """The type inside Optional[...], list[...] or dict[str, ...]; other hints as they are."""
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        hint = next(a for a in typing.get_args(hint) if a is not type(None))
-    if typing.get_origin(hint) is list:
-        hint = typing.get_args(hint)[0]
-    if typing.get_origin(hint) is dict:
-        hint = typing.get_args(hint)[1]
-    return hint
+@lru_cache(32)
+def _nodes(content: str) -> yaml.Node | None:
+    """Nodes, which nothing here changes; the same files are read again and again."""
+    return compose_yaml(content)
 
 
-def _find(node: yaml.MappingNode, key: str) -> int | None:
-    for index, (name, _) in enumerate(node.value):
-        if name.value == key:
-            return index
-    return None
+@cache
+def _adapter(schema: Any) -> Any:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(schema)
 
 
-def _override(
-    schema: type, root: yaml.MappingNode, item: str, error: type[DataFileError]
-) -> tuple[str, yaml.Node]:
-    """Edits the node graph in place as an override key.subkey=value asks.
+def dump_typed(settings: Any) -> str:
+    """Settings as YAML, which `load_typed` reads back; what is None is left out."""
+    words = yaml.dump(
+        _rows(plain_values(settings)),
+        Dumper=_Dumper,
+        sort_keys=False,
+        allow_unicode=True,
+        width=100,
+    )
+    return str(words)
 
-    Returns:
-        Words that say where the value comes from, and the new node.
-    """
+
+def plain_values(settings: Any) -> dict[str, Any]:
+    """What settings say, as mappings, lists, words and numbers of one's own; None is left out."""
+    values = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
+    return {name: _plain(value) for name, value in values.items() if value is not None}
+
+
+def _plain(value: Any) -> Any:
+    if dataclasses.is_dataclass(value):
+        return plain_values(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    return value
+
+
+class _Row(list[float]):
+    """Numbers of one line."""
+
+
+class _Dumper(yaml.SafeDumper):
+    """PyYAML's, with lists of numbers in a line."""
+
+
+_Dumper.add_representer(
+    _Row, lambda dumper, row: dumper.represent_sequence(_TAG + "seq", row, flow_style=True)
+)
+
+
+def _rows(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _rows(item) for name, item in value.items()}
+    if isinstance(value, list):
+        is_row = not any(isinstance(item, dict | list | str) for item in value)
+        return _Row(value) if is_row else [_rows(item) for item in value]
+    return value
+
+
+class _Word(str):
+    """A scalar as it stands in a file, with its tag."""
+
+    tag = ""
+
+
+def _words(node: yaml.Node, problems: _Problems, place: Place) -> Any:
+    """What nodes say: scalars as words, null as None; what has another tag stays a node."""
+    tag = node.tag.removeprefix(_TAG)
+    if isinstance(node, yaml.ScalarNode) and tag in _SCALARS and tag != node.tag:
+        word = _Word(node.value)
+        word.tag = tag
+        return None if tag == "null" else word
+    if isinstance(node, yaml.SequenceNode) and tag == "seq":
+        return [_words(child, problems, (*place, k)) for k, child in enumerate(node.value)]
+    if not isinstance(node, yaml.MappingNode) or tag != "map":
+        return node
+    data: dict[str, Any] = {}
+    for key, child in node.value:
+        name = key.value if isinstance(key, yaml.ScalarNode) else shown(key)
+        if name in data:
+            problems.add((*place, name), "found twice; accepted: once", at_key=True)
+        data[name] = _words(child, problems, (*place, name))
+    return data
+
+
+def _override(schema: type, data: dict[str, Any], item: str, problems: _Problems) -> None:
+    """Puts "key.subkey=value" into the data of a file."""
     key, equals, value = item.partition("=")
     key = key.strip()
     if not equals or not key:
-        raise error(f"overrides {printable(item)}: accepted: key=value, as in seed=3")
-    node, here = root, schema
+        problems.note(f"overrides {printable(item)}: accepted: key=value, as in seed=3")
+        return
     names = key.split(".")
-    for depth, name in enumerate(names[:-1]):
-        rule, bare = _known_rule(here, names, depth, error)
-        if rule.kind != "section":
-            raise error(f"overrides {key}: {'.'.join(names[: depth + 1])} has no keys of its own")
-        index = _find(node, name)
-        child = None if index is None else node.value[index][1]
-        if not isinstance(child, yaml.MappingNode):
-            child = yaml.MappingNode("tag:yaml.org,2002:map", [])
-            _put(node, name, child)
-        node, here = child, bare
-    _known_rule(here, names, len(names) - 1, error)
+    here: type = schema
+    for depth, name in enumerate(names):
+        known = settings_of(here)
+        if name not in known:
+            where = printable(".".join(names[:depth]) or "the scenario")
+            words = f"there is no key {printable(name)} in {where}; {closest(name, known)}"
+            problems.note(f"overrides {printable(key)}: {words}")
+            return
+        section = known[name].section
+        if depth < len(names) - 1:
+            if section is None or known[name].many:
+                inner = ".".join(names[: depth + 1])
+                problems.note(f"overrides {key}: {inner} has no keys of its own")
+                return
+            here = section
     try:
-        new = compose_yaml(value)
+        node = compose_yaml(value)
     except YamlTextError as problem:
         words = repr(value) if len(value) <= 60 else f"{value[:57]!r}..."
-        known = problem.line is not None  # where it stops to be YAML
-        what = f"found {words}, which is not YAML" if known else str(problem)
-        raise error(f"overrides {key}: {what}") from problem
-    if new is None:
-        new = yaml.ScalarNode(_NULL_TAG, "null")
-    _put(node, names[-1], new)
-    return f"overrides {key}", new
+        known_line = problem.line is not None  # where it stops to be YAML
+        words = f"found {words}, which is not YAML" if known_line else str(problem)
+        problems.note(f"overrides {key}: {words}")
+        return
+    problems.origins[tuple(names)] = f"overrides {key}"
+    for name in names[:-1]:
+        if not isinstance(data.get(name), dict):
+            data[name] = {}
+        data = data[name]
+    data[names[-1]] = None if node is None else _words(node, problems, tuple(names))
 
 
-def _known_rule(
-    schema: type, names: list[str], depth: int, error: type[DataFileError]
-) -> tuple[FieldRule, Any]:
-    """Rule and type of the key `names[depth]`, which must be one of the schema's."""
-    rules = rules_of(schema)
-    if names[depth] not in rules:
-        where = ".".join(names[:depth]) or "the scenario"
-        raise error(
-            f"overrides {printable('.'.join(names))}: there is no key {printable(names[depth])} "
-            f"in {printable(where)}; "
-            f"{closest(names[depth], rules)}"
-        )
-    return rules[names[depth]]
+class _Problems:
+    """What a file is refused for, in the order of its lines."""
 
-
-def _put(node: yaml.MappingNode, key: str, value: yaml.Node) -> None:
-    """Sets or appends a key of a mapping node."""
-    index = _find(node, key)
-    if index is None:
-        node.value.append((yaml.ScalarNode("tag:yaml.org,2002:str", key), value))
-    else:
-        node.value[index] = (node.value[index][0], value)
-
-
-def _mark_origin(node: yaml.Node, origin: str, origins: dict[int, str]) -> None:
-    """Notes for a node and all below it, by identity, where they come from if not from the file."""
-    origins[id(node)] = origin
-    if isinstance(node, yaml.SequenceNode):
-        children = node.value
-    elif isinstance(node, yaml.MappingNode):
-        children = [child for pair in node.value for child in pair]
-    else:
-        children = []
-    for child in children:
-        _mark_origin(child, origin, origins)
-
-
-class _Checker:
-    """Walks YAML nodes along a schema and notes what is not accepted."""
-
-    def __init__(self, path: Path, problems: Problems, origins: dict[int, str]) -> None:
-        self._path = path
-        self._problems = problems
-        self._origins = origins
-
-    def fail(self, node: yaml.Node | None, key: str, problem: str) -> None:
-        origin = self._origins.get(id(node))
-        if origin is not None:
-            inner = "" if origin == f"overrides {key}" else f"{key}: "
-            self._problems.add(f"{origin}: {inner}{problem}")
-            return
-        mark = None if node is None else node.start_mark
-        line = "" if mark is None else f":{mark.line + 1}"
-        self._problems.add(f"{self._path}{line}: {key + ': ' if key else ''}{problem}")
-
-    def section(self, schema: type, node: yaml.Node, key: str) -> None:
-        if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
-            self.fail(node, key, f"found {show(node)}; accepted: a mapping")
-            return
-        rules = rules_of(schema)
-        seen: set[str] = set()
-        meant: set[str] = set()
-        for name_node, child in node.value:
-            name = show(name_node)
-            name_node.tag = _TAG + "str"  # a key such as `on` is a word, not a switch
-            full = f"{key}.{name}" if key else name
-            if name not in rules:
-                self.fail(name_node, full, f"unknown key; {closest(name, rules)}")
-                meant.update(meant_names(name, rules))
-            elif name in seen:
-                self.fail(name_node, full, "found twice; accepted: once")
-            else:
-                seen.add(name)
-                rule, bare = rules[name]
-                self.value(rule, bare, child, full)
-        for name, (rule, _) in rules.items():
-            if rule.required and name not in seen | meant:
-                full = f"{key}.{name}" if key else name
-                self.fail(node, full, f"missing; accepted: {rule.accepts()}")
-
-    def value(self, rule: FieldRule, bare: Any, node: yaml.Node, key: str) -> None:
-        if node.tag == _NULL_TAG:
-            if not rule.nullable:
-                self.fail(node, key, f"found null; accepted: {rule.accepts()}")
-        elif rule.kind == "section":
-            self.section(bare, node, key)
-        elif rule.kind in ("sections", "texts"):
-            if not _is_list(node):
-                self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
-                return
-            for index, child in enumerate(node.value):
-                if rule.kind == "sections":
-                    self.section(bare, child, f"{key}[{index}]")
-                else:
-                    self.scalar(dataclasses.replace(rule, kind="text"), child, f"{key}[{index}]")
-        elif rule.kind in NAMED:
-            self.named(rule, bare, node, key)
-        elif rule.kind == "array":
-            self.numbers(rule, node, key, rule.shape)
-        else:
-            self.scalar(rule, node, key)
-
-    def named(self, rule: FieldRule, bare: Any, node: yaml.Node, key: str) -> None:
-        if not isinstance(node, yaml.MappingNode) or node.tag != _TAG + "map":
-            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
-            return
-        seen: set[str] = set()
-        for k, (name_node, child) in enumerate(node.value):
-            full = f"{key}.{show(name_node)}"
-            if not isinstance(name_node, yaml.ScalarNode):
-                self.fail(name_node, full, "found no name; accepted: a name")
-                continue
-            name_node.tag = _TAG + "str"
-            if name_node.value in seen:
-                self.fail(name_node, full, "found twice; accepted: once")
-            seen.add(name_node.value)
-            if rule.kind == "named_sections":
-                self.section(bare, child, full)
-            elif rule.kind == "named_texts":
-                self.scalar(dataclasses.replace(rule, kind="text"), child, full)
-            else:
-                if isinstance(child, yaml.ScalarNode):  # one number is a list of one
-                    child = yaml.SequenceNode(
-                        _TAG + "seq", [child], child.start_mark, child.end_mark, flow_style=True
-                    )
-                    node.value[k] = (name_node, child)
-                one = dataclasses.replace(rule, kind="array", shape=(None,))
-                self.numbers(one, child, full, one.shape)
-
-    def numbers(
-        self, rule: FieldRule, node: yaml.Node, key: str, shape: tuple[int | None, ...]
+    def __init__(
+        self, error: type[DataFileError], path: Path | None, root: yaml.Node | None
     ) -> None:
-        if not shape:
-            self.scalar(rule, node, key)
-            return
-        wrong = not _is_list(node) or not node.value
-        if wrong or (shape[0] is not None and len(node.value) != shape[0]):
-            self.fail(node, key, f"found {show(node)}; accepted: {rule.accepts()}")
-            return
-        for index, child in enumerate(node.value):
-            self.numbers(rule, child, f"{key}[{index}]", shape[1:])
+        self.schema: type = object
+        self.data: Any = None
+        self.origins: dict[Place, str] = {}
+        self._error, self._path, self._root = error, path, root
+        self._said: list[tuple[float, str]] = []
 
-    def scalar(self, rule: FieldRule, node: yaml.Node, key: str) -> None:
-        if not _convert(rule, node):
-            plain = rule.kind == "text" and not rule.pattern and not rule.choices
-            if plain and _CONTROL.search(str(node.value)):
-                self.fail(node, key, f"found {show(node)}; accepted: no control characters")
+    def note(self, words: str) -> None:
+        """Of an override that is none, or of another file."""
+        self._said.append((-1, words))
+
+    def add(self, place: Place, words: str, at_key: bool = False) -> None:
+        """What is wrong with a value, or at its key."""
+        key = key_of(place)
+        for origin in (place[:n] for n in range(len(place), 0, -1)):
+            if origin in self.origins:
+                inner = "" if origin == place else f"{key}: "
+                self._said.append((math.inf, f"{self.origins[origin]}: {inner}{words}"))
                 return
-            if isinstance(node, yaml.ScalarNode) and node.tag not in _SCALARS:
-                tag = node.tag.replace(_TAG, "!!")[:80]
-                self.fail(node, key, f"found the tag {tag}; accepted: a value without one")
-                return
-            found = node.value if isinstance(node, yaml.ScalarNode) else ""
-            hint = "".join(f"did you mean {name}? " for name in meant_names(found, rule.choices))
-            self.fail(node, key, f"found {show(node)}; {hint}accepted: {rule.accepts(found)}")
+        line = 0
+        if self._root is not None:
+            line = _nodes_at(self._root, place)[0 if at_key else 1].start_mark.line + 1
+        file = "" if self._path is None else f"{self._path}:{line}: " if line else f"{self._path}: "
+        self._said.append((line, f"{file}{key + ': ' if key else ''}{words}"))
+
+    def add_all(self, errors: Iterable[Any]) -> None:
+        """What pydantic found."""
+        errors = list(errors)
+        unknown = [error["loc"] for error in errors if error["type"] in _UNKNOWN]
+        meant = {
+            (*at[:-1], name)
+            for at in unknown
+            for name in meant_names(at[-1], settings_of(_owner(self.schema, at)[0]))
+        }
+        for error in errors:
+            place = error["loc"]
+            if error["type"] == "missing" and place in meant:
+                continue
+            self.add(place, self._words(error), error["type"] in _UNKNOWN)
+
+    def add_refusals(self, settings: Any, scope: Scope, within: Place = ()) -> None:
+        """What sections refuse."""
+        asked = [(at, each.refusals) for at, each in _sections(settings, within)
+                 if hasattr(each, "refusals")]  # fmt: skip
+        asked += [(within, more) for more in scope.more]
+        for place, refusals in asked:
+            try:
+                for key, found, accepted in refusals(scope):
+                    parts = re.findall(r"[^.\[\]]+", key)
+                    at = (*place, *(int(part) if part.isdecimal() else part for part in parts))
+                    self.add(at, f"found {found}; accepted: {accepted}" if accepted else str(found))
+            except self._error as problem:  # of a file that a section names
+                for words in problem.problems:
+                    self.note(words)
+            except Exception:  # may follow from what is said already
+                if not self._said:
+                    raise
+
+    def _words(self, error: Any) -> str:
+        section, setting = _owner(self.schema, error["loc"])
+        if setting is None:
+            return f"unknown key; {closest(error['loc'][-1], settings_of(section))}"
+        if error["type"] == "missing":
+            return f"missing; accepted: {setting.accepts()}"
+        value = self.data
+        for part in error["loc"]:
+            value = value[part] if isinstance(value, list | dict) else value
+        if isinstance(value, yaml.ScalarNode):
+            tag = value.tag.replace(_TAG, "!!")[:80]
+            return f"found the tag {tag}; accepted: a value without one"
+        words, choices = value if isinstance(value, str) else "", setting.choices
+        if setting.many and error["loc"][-1] != setting.name:  # one of several
+            setting = dataclasses.replace(setting, many=None)
+        likely = () if setting.many else meant_names(words, choices)
+        hint = "".join(f"did you mean {name}? " for name in likely)
+        return f"found {shown(value)}; {hint}accepted: {setting.accepts(words)}"
+
+    def raise_any(self) -> None:
+        """Raises an error with all of them."""
+        problems = Problems(self._error)
+        for _, words in sorted(self._said, key=lambda said: said[0]):
+            problems.add(words)
+        problems.raise_any()
 
 
-def _convert(rule: FieldRule, node: yaml.Node) -> bool:
-    """Makes a node say what was checked, however YAML would read it; False where it is not
-    accepted."""
-    if not isinstance(node, yaml.ScalarNode) or node.tag not in _SCALARS:
-        return False
-    if rule.kind == "text":
-        if _CONTROL.search(node.value):
-            return False
-        if rule.choices and node.value not in rule.choices:
-            return False
-        if rule.pattern and not re.fullmatch(rule.pattern, node.value):
-            return False
-        node.tag = _TAG + "str"  # also where YAML reads a number or a switch
-    elif rule.kind == "switch":
-        return node.tag == _TAG + "bool" and node.value.lower() in _BOOLEANS
-    else:
-        value = _as_number(node.value)
-        if not rule.in_range(value) or (rule.kind == "whole" and value != int(value)):
-            return False
-        # Such as 1e3 and 010.
-        if rule.kind == "whole":
-            node.tag, node.value = _TAG + "int", str(int(value))
-        else:
-            node.tag, node.value = _TAG + "float", repr(value)
-    return True
+def _sections(section: Any, place: Place) -> Iterator[tuple[Place, Any]]:
+    """A section and all within, each with its place in the file."""
+    yield place, section
+    for field in dataclasses.fields(section):
+        value, at = getattr(section, field.name), (*place, field.name)
+        inside: dict[Place, Any] = {at: value}
+        if isinstance(value, list):
+            inside = {(*at, k): item for k, item in enumerate(value)}
+        elif isinstance(value, dict):
+            inside = {(*at, name): item for name, item in value.items()}
+        for where, item in inside.items():
+            if dataclasses.is_dataclass(item):
+                yield from _sections(item, where)
 
 
-def _is_list(node: yaml.Node) -> bool:
-    return isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq"
+def _owner(schema: type, place: Place) -> tuple[type, Setting | None]:
+    """The class of the section that a place lies in, and its setting; None: there is no such."""
+    setting = settings_of(schema).get(str(place[0]))
+    rest = place[2:] if setting is not None and setting.many else place[1:]
+    if rest and setting is not None and setting.section:
+        return _owner(setting.section, rest)
+    return schema, setting
 
 
-def _as_number(words: str) -> float:
-    try:
-        return float(words)
-    except ValueError:
-        return math.nan
+def _nodes_at(root: yaml.Node, place: Place) -> tuple[yaml.Node, yaml.Node]:
+    """The nodes of the key and of the value of a place, or of what is nearest round it."""
+    key = node = root
+    for part in place:
+        if isinstance(node, yaml.SequenceNode) and isinstance(part, int):
+            key = node = node.value[part]
+        elif isinstance(node, yaml.MappingNode):
+            found = [pair for pair in node.value if shown(pair[0]) == part or pair[0].value == part]
+            if not found:
+                break
+            key, node = found[-1]
+    return key, node
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """Words that help after an unknown name: the likely one, then all that exist."""
+    names = list(known)
+    hint = "".join(f"did you mean {likely}? " for likely in meant_names(name, names))
+    return f"{hint}known: {', '.join(names)}"
+
+
+def key_of(place: Place) -> str:
+    """A place as keys with dots, and indices in brackets."""
+    parts = (f"[{part}]" if isinstance(part, int) else f".{shown(part)}" for part in place)
+    return "".join(parts).removeprefix(".")
+
+
+def printable(words: str) -> str:
+    """The words as they are, or quoted with escapes where they would break the line."""
+    return words if words.isprintable() else repr(words)
+
+
+def shown(value: Any) -> str:
+    """A value or node as it could stand in a file, cut to 60 characters."""
+    if isinstance(value, yaml.Node) and too_many_nodes(value):
+        return "very many values"
+    words = printable(_flow(value)) or "nothing"
+    return words if len(words) <= 60 else words[:57] + "..."
+
+
+def _flow(value: Any) -> str:
+    if isinstance(value, yaml.Node):
+        value = dict(value.value) if isinstance(value, yaml.MappingNode) else value.value
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_flow, value)) + "]"
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_flow(key)}: {_flow(item)}" for key, item in value.items()) + "}"
+    return "null" if value is None else str(value)

@@ -3,20 +3,19 @@
 All YAML goes through these two. They refuse what is large, nested deeply, or large once its
 aliases are expanded: files of robots and scenarios are small, and a bomb is told at once.
 `other_kind` tells a file that was given to the wrong loader, from the keys at its top.
-`cached_yaml` keeps what was parsed before.
 """
 
 from __future__ import annotations
 
-import copy
-from collections import OrderedDict
 from collections.abc import Collection
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import yaml
-from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
+from yaml.composer import Composer
+from yaml.constructor import SafeConstructor
+from yaml.cyaml import CParser  # type: ignore[attr-defined]
+from yaml.resolver import Resolver
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.input_files import input_size
@@ -43,9 +42,6 @@ MOST_BYTES = 262_144
 MOST_NODES = 100_000
 """Keys and values of a file, those that an alias repeats counted again."""
 
-SMALL, MOST = 20_000, 32
-"""Letters of files that are kept, and how many of them."""
-
 
 class YamlTextError(CdprError, ValueError):
     """Text that is not YAML, or more of it than is read; in words that follow a file's name."""
@@ -60,15 +56,21 @@ class YamlTextError(CdprError, ValueError):
         return f"{path}{'' if self.line is None else f':{self.line}'}: {self}"
 
 
-class _Reader(yaml.SafeLoader):
-    """PyYAML's safe loader with a bound on depth and on whole numbers."""
+class _Reader(Composer, CParser, SafeConstructor, Resolver):
+    """PyYAML's safe loader, over events of libyaml, with a bound on depth and on whole numbers."""
 
     depth = 0
+
+    def __init__(self, content: str) -> None:
+        CParser.__init__(self, content)
+        Composer.__init__(self)
+        SafeConstructor.__init__(self)
+        Resolver.__init__(self)
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         self.depth += 1
         if self.depth > MOST_DEPTH:
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            mark: Any = self.peek_event().start_mark  # type: ignore[union-attr]
             words = f"nested more than {MOST_DEPTH} deep"
             raise yaml.composer.ComposerError(None, None, words, mark)
         node: yaml.Node | None = super().compose_node(parent, index)
@@ -82,7 +84,7 @@ class _Reader(yaml.SafeLoader):
         return int(super().construct_yaml_int(node))
 
 
-_Reader.add_constructor("tag:yaml.org,2002:int", _Reader.construct_yaml_int)
+_Reader.add_constructor("tag:yaml.org,2002:int", _Reader.construct_yaml_int)  # type: ignore[type-var]
 
 
 def compose_yaml(content: str) -> yaml.Node | None:
@@ -102,12 +104,6 @@ def load_yaml(content: str) -> Any:
         YamlTextError: As `compose_yaml`, or a value is not what its tag says.
     """
     return _read(content, construct=True)
-
-
-def plain_values(instance: Any) -> dict[str, Any]:
-    """What an instance of a schema says, as mappings, lists, words and numbers of one's own."""
-    found: dict[str, Any] = yaml.safe_load(yaml_dump_typed(instance))
-    return found
 
 
 def _read(content: str, construct: bool) -> Any:
@@ -193,62 +189,3 @@ def _size(node: yaml.Node, sizes: dict[int, int]) -> int:
         total += sum(_size(key, sizes) + _size(value, sizes) for key, value in node.value)
     sizes[id(node)] = total
     return total
-
-
-class CachedYaml:
-    """Nodes of a text, and the instance of a schema that they make.
-
-    Who checks the nodes writes numbers and words plainly into them, which changes nothing when it
-    is done again. What is refused has to be forgotten, since its nodes may be changed by half.
-    """
-
-    def __init__(self, schema: type, content: str) -> None:
-        self._schema, self._content = schema, content
-        self._root: yaml.Node | None = None
-        self._made: Any = None
-
-    def nodes(self) -> yaml.Node | None:
-        """Its nodes; raises YamlTextError as `compose_yaml` does."""
-        if self._root is None:
-            self._root = compose_yaml(self._content)
-        return self._root
-
-    def instance(self) -> Any:
-        """An instance of the schema of one's own, by the nodes as they are at the first call."""
-        if self._made is None:
-            self._made = yaml_load_typed(schema=self._schema, data=yaml.serialize(self._root))
-        return copy.deepcopy(self._made)
-
-    def forget(self) -> None:
-        """Lets the next one begin anew."""
-        with _CHANGING:
-            _KEPT.pop((self._schema, self._content), None)
-
-
-def cached_yaml(schema: type, content: str, edited: bool) -> CachedYaml:
-    """A text that was read before, or one anew.
-
-    The same small files are read again and again: a run reads its robot five times and a study
-    hundreds of times, and PyYAML takes 5 ms each time in each of three passes. What a file says is
-    checked every time all the same, as that may change.
-
-    Args:
-        schema: Dataclass.
-        content: YAML.
-        edited: Whether nodes will be changed beyond what a check does; such a one is not kept.
-    """
-    found = None if edited else _KEPT.get((schema, content))
-    if found is None:
-        found = CachedYaml(schema, content)
-    if not edited and len(content) <= SMALL:
-        with _CHANGING:
-            _KEPT[schema, content] = found
-            _KEPT.move_to_end((schema, content))
-            while len(_KEPT) > MOST:
-                _KEPT.popitem(last=False)
-    return found
-
-
-_KEPT: OrderedDict[tuple[type, str], CachedYaml] = OrderedDict()
-
-_CHANGING = Lock()

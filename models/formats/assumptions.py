@@ -13,7 +13,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import RobotDraft
 from cdpr_drake.models.formats.home_search import farthest_pose
 from cdpr_drake.models.formats.point_mass import find_beam, to_a_point
-from cdpr_drake.schema.fields import LARGEST
+from cdpr_drake.schema.declarations import LARGEST
 
 GRAVITY = 9.81
 MASS = 1.0

@@ -13,7 +13,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.fields import LARGEST, NAME
+from cdpr_drake.schema.declarations import LARGEST, NAME
 from cdpr_drake.schema.input_files import input_bytes, input_size
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml

@@ -3,14 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
-from pydrake.common.yaml import yaml_dump_typed
-
 import cdpr_drake as cdpr
+from cdpr_drake.schema.typed_yaml import dump_typed
 
 small = cdpr.load_robot("acrobot_small")
 heavier = replace(small, name="mine", platform=replace(small.platform, mass=1.0))
 path = Path("mine.yaml")
-path.write_text(yaml_dump_typed(heavier))
+path.write_text(dump_typed(heavier))
 
 robot = cdpr.load_robot(path)
 print(robot)

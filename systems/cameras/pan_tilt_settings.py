@@ -1,16 +1,22 @@
-"""Scenario section `camera.pan_tilt`: two joints that turn the servo's camera.
+"""Scenario section `camera.pan_tilt`: two joints that turn the servo's camera."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
 
-from cdpr_drake.schema.fields import FASTEST, array, number, whole
+from cdpr_drake.schema.declarations import (
+    FASTEST,
+    In,
+    Refusal,
+    Scope,
+    number_words,
+    settings,
+    values,
+)
 
 
-@dataclass(kw_only=True)
+@settings
 class CameraPanTilt:
     """Two joints that carry the camera and keep the target in the middle of its image.
 
@@ -18,40 +24,54 @@ class CameraPanTilt:
     upwards.
     """
 
-    arm: np.ndarray = array(
+    arm: Annotated[
+        np.ndarray,
+        In("m", 3),
         "Position of the camera from where the axes meet, both angles zero, in the camera frame.",
-        "m",
-        (3,),
-        (0.0, 0.0, 0.0),
+    ] = values(0.0, 0.0, 0.0)
+    lower_deg: Annotated[np.ndarray, In("deg", 2), "Smallest angles, pan and tilt."] = values(
+        -75.0, -75.0
     )
-    lower_deg: np.ndarray = array("Smallest angles, pan and tilt.", "deg", (2,), (-75.0, -75.0))
-    upper_deg: np.ndarray = array("Largest angles.", "deg", (2,), (75.0, 75.0))
-    speed_deg: np.ndarray = array("Largest speeds.", "deg/s", (2,), (120.0, 120.0), above=0.0)
-    start_deg: np.ndarray = array("Angles at the start.", "deg", (2,), (0.0, 0.0))
-    gain: float = number(
+    upper_deg: Annotated[np.ndarray, In("deg", 2), "Largest angles."] = values(75.0, 75.0)
+    speed_deg: Annotated[np.ndarray, In("deg/s", 2, gt=0.0), "Largest speeds."] = values(
+        120.0, 120.0
+    )
+    start_deg: Annotated[np.ndarray, In("deg", 2), "Angles at the start."] = values(0.0, 0.0)
+    gain: Annotated[
+        float,
+        In("1/s", gt=0.0, le=1000.0),
         "Of the law that takes the target to the middle of the image.",
-        "1/s",
-        4.0,
-        above=0.0,
-        at_most=1000.0,
-    )
-    rate: float = number(
-        "Looks of the joints at their command.", "Hz", 100.0, above=0.0, at_most=FASTEST
-    )
-    patience: float = number(
+    ] = 4.0
+    rate: Annotated[
+        float, In("Hz", gt=0.0, le=FASTEST), "Looks of the joints at their command."
+    ] = 100.0
+    patience: Annotated[
+        float,
+        In("s", ge=0.0),
         "Time without the target after which the joints look for it, in a spiral; 0: at once.",
-        "s",
-        0.2,
-        at_least=0.0,
-    )
-    search_deg: float = number("Speed of the look-out.", "deg/s", 60.0, above=0.0, at_most=10_000.0)
-    counts_per_turn: int = whole("Counts of an encoder per turn.", 4096, at_least=4)
-    zero_error_deg: float = number(
-        "Standard deviation of an encoder's zero.", "deg", 0.0, at_least=0.0
-    )
-    offset_deg: np.ndarray = array(
-        "What the encoders read too much beside that, pan and tilt.", "deg", (2,), (0.0, 0.0)
-    )
-    noise_deg: float = number(
-        "Standard deviation of a reading of an encoder.", "deg", 0.0, at_least=0.0
-    )
+    ] = 0.2
+    search_deg: Annotated[float, In("deg/s", gt=0.0, le=10000.0), "Speed of the look-out."] = 60.0
+    counts_per_turn: Annotated[int, In(ge=4), "Counts of an encoder per turn."] = 4096
+    zero_error_deg: Annotated[
+        float, In("deg", ge=0.0), "Standard deviation of an encoder's zero."
+    ] = 0.0
+    offset_deg: Annotated[
+        np.ndarray, In("deg", 2), "What the encoders read too much beside that, pan and tilt."
+    ] = values(0.0, 0.0)
+    noise_deg: Annotated[
+        float, In("deg", ge=0.0), "Standard deviation of a reading of an encoder."
+    ] = 0.0
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits with nothing between, or beyond half a turn, and a start outside of them."""
+        lower, upper, start = self.lower_deg, self.upper_deg, self.start_deg
+        if np.any(lower > upper):
+            yield "lower_deg", f"{_pair(lower)}", f"at most upper_deg, {_pair(upper)}"
+        elif np.any(np.maximum(np.abs(lower), np.abs(upper)) > 180.0):
+            yield "", f"limits {_pair(lower)} and {_pair(upper)}", "-180 to 180 [deg]"
+        elif np.any(start < lower) or np.any(start > upper):
+            yield "start_deg", _pair(start), f"{_pair(lower)} to {_pair(upper)}"
+
+
+def _pair(angles: np.ndarray) -> str:
+    return f"{number_words(angles)} [deg]"

@@ -11,12 +11,11 @@
 All but stop need `winches.mode` torque.
 
 It is known by being told, as by a switch on the drum, or found by a `BreakDetector`.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import Value
@@ -26,7 +25,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.estimation.break_detection import BreakRule, residual_noise
 from cdpr_drake.geometry.poses import pose_from_row, pose_row, rotation_vector
-from cdpr_drake.schema.fields import FASTEST, number, optional_section, text, whole
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 
 STOP, REDISTRIBUTE, BRAKE, RETREAT, DESCEND = REACTIONS = (
     "stop", "redistribute", "brake", "retreat", "descend",
@@ -40,100 +39,97 @@ ACCEPTED = 1e-3
 HOURS = 1.0
 
 
-@dataclass(kw_only=True)
+@settings
 class WatchSettings:
     """When other failures than broken cables are told; nothing is done about them.
 
     A reading of an encoder is up to a period old: by default `lag` covers 0.5 m/s at 512 Hz.
     """
 
-    torque: float | None = number(
-        "Torque of a motor that asked torque, tension, inertia and friction do not explain; null: "
-        "static friction, the tension sensor's constant error, and noise.",
-        "N m",
-        None,
-        above=0.0,
-    )
-    bandwidth: float = number(
-        "At which this torque is smoothed; below a sixth of `emergency.rate`.", "Hz", 10.0,
-        above=0.0,
-    )  # fmt: skip
-    lag: float = number(
-        "By how much a measured length may lag behind the drive's speed.", "m", 1e-3, above=0.0
-    )
-    leak: float = number("Time in which such differences are forgotten.", "s", 1.0, above=0.0)
-    in_a_row: int = whole("Samples in a row of torque and lag that make an alarm.", 5, at_least=1)
-    dark: float = number("Without a sight of the target.", "s", 0.12, above=0.0)
-    late: float = number("With the very same sight of it.", "s", 0.12, above=0.0)
+    torque: Annotated[
+        float | None,
+        In("N m", gt=0.0),
+        "Torque of a motor that asked torque, tension, inertia and friction do not "
+        "explain; null: static friction, the tension sensor's constant error, and noise.",
+    ] = None
+    bandwidth: Annotated[
+        float,
+        In("Hz", gt=0.0),
+        "At which this torque is smoothed; below a sixth of `emergency.rate`.",
+    ] = 10.0
+    lag: Annotated[
+        float, In("m", gt=0.0), "By how much a measured length may lag behind the drive's speed."
+    ] = 0.001
+    leak: Annotated[float, In("s", gt=0.0), "Time in which such differences are forgotten."] = 1.0
+    in_a_row: Annotated[int, In(ge=1), "Samples in a row of torque and lag that make an alarm."] = 5
+    dark: Annotated[float, In("s", gt=0.0), "Without a sight of the target."] = 0.12
+    late: Annotated[float, In("s", gt=0.0), "With the very same sight of it."] = 0.12
 
 
-@dataclass(kw_only=True)
+@settings
 class EmergencySettings:
     """What is done when a cable has broken, and how that is known."""
 
-    reaction: str = text("What is done.", choices=REACTIONS)
-    motion: str = text(
+    reaction: Annotated[str, OneOf(REACTIONS), "What is done."]
+    motion: Annotated[
+        str,
+        OneOf((HOLD, CONTINUE)),
         "What redistribution is to do with the platform: hold it where it is, or continue.",
-        HOLD,
-        choices=(HOLD, CONTINUE),
-    )
-    speed: float = number(
-        "Largest speed of a retreat, of which turning counts with the anchor points' distance, and "
-        "that of a descent.",
-        "m/s",
-        0.1,
-        above=0.0,
-    )
-    least_tension: float = number(
-        "Smallest tension of the cables left at the pose of a retreat.", "N", 0.5, at_least=0.0
-    )
-    ground_distance: float = number(
+    ] = HOLD
+    speed: Annotated[
+        float,
+        In("m/s", gt=0.0),
+        "Largest speed of a retreat, of which turning counts with the anchor points' "
+        "distance, and that of a descent.",
+    ] = 0.1
+    least_tension: Annotated[
+        float, In("N", ge=0.0), "Smallest tension of the cables left at the pose of a retreat."
+    ] = 0.5
+    ground_distance: Annotated[
+        float,
+        In("m", ge=0.0),
         "Height of the lowest anchor point over the frame's lower end at which a descent ends.",
-        "m",
-        0.02,
-        at_least=0.0,
-    )
-    known: str = text(
+    ] = 0.02
+    known: Annotated[
+        str,
+        OneOf((TOLD, FOUND)),
         "How it is known: told when it happens, or found from lengths and tensions.",
-        TOLD,
-        choices=(TOLD, FOUND),
-    )
-    delay: float = number(
-        "From when it is known until the brakes have closed, or the others are asked.", "s", 0.0,
-        at_least=0.0,
-    )  # fmt: skip
-    rate: float = number("How often it is looked at.", "Hz", 500.0, above=0.0, at_most=FASTEST)
-    pose_noise: float = number(
+    ] = TOLD
+    delay: Annotated[
+        float,
+        In("s", ge=0.0),
+        "From when it is known until the brakes have closed, or the others are asked.",
+    ] = 0.0
+    rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "How often it is looked at."] = 500.0
+    pose_noise: Annotated[
+        float,
+        In("m", ge=0.0),
         "Standard deviation of the lengths that follow from the believed pose and the sensors.",
-        "m",
-        2e-4,
-        at_least=0.0,
-    )
-    pose_accuracy: float = number(
-        "By how much the error of the believed pose, at an anchor point, may change while a cable "
-        "does not pull.",
-        "m",
-        3e-3,
-        at_least=0.0,
-    )
-    exit_accuracy: float = number(
-        "Bound of the errors of believed exit points.", "m", 3e-3, at_least=0.0
-    )
-    anchor_accuracy: float = number(
-        "Bound of the errors of believed anchor points.", "m", 1e-3, at_least=0.0
-    )
-    slack_below: float | None = number(
-        "Measured tension up to which a cable may be broken: what its sensor may read without one; "
-        "null: by the sensor's accuracy and noise.",
-        "N",
-        None,
-        at_least=0.0,
-    )
-    in_a_row: int = whole("Samples in a row that make an alarm.", 3, at_least=1)
-    watch: WatchSettings | None = optional_section(
-        "Watches winches, sensors and camera, too, and logs alarms; null: broken cables alone. "
-        "With winches.mode torque."
-    )
+    ] = 0.0002
+    pose_accuracy: Annotated[
+        float,
+        In("m", ge=0.0),
+        "By how much the error of the believed pose, at an anchor point, may change while"
+        " a cable does not pull.",
+    ] = 0.003
+    exit_accuracy: Annotated[
+        float, In("m", ge=0.0), "Bound of the errors of believed exit points."
+    ] = 0.003
+    anchor_accuracy: Annotated[
+        float, In("m", ge=0.0), "Bound of the errors of believed anchor points."
+    ] = 0.001
+    slack_below: Annotated[
+        float | None,
+        In("N", ge=0.0),
+        "Measured tension up to which a cable may be broken: what its sensor may read "
+        "without one; null: by the sensor's accuracy and noise.",
+    ] = None
+    in_a_row: Annotated[int, In(ge=1), "Samples in a row that make an alarm."] = 3
+    watch: Annotated[
+        WatchSettings | None,
+        "Watches winches, sensors and camera, too, and logs alarms; null: broken cables "
+        "alone. With winches.mode torque.",
+    ] = None
 
     def samples(self) -> float:
         """Looks in `HOURS`."""

@@ -1,9 +1,7 @@
-"""Scenario section `force_control` of dynamic control, and its block: laws that answer forces.
+"""Scenario section `force_control` of dynamic control, and its block: laws that answer forces."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -37,9 +35,18 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.schema.fields import array, number, switch, text, texts
+from cdpr_drake.schema.declarations import (
+    In,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    filled,
+    settings,
+    values,
+)
+from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
@@ -53,78 +60,71 @@ TOUCHES = 0.2
 """Share of the wanted force from which something is touched: what is missing is gathered then."""
 
 
-@dataclass(kw_only=True)
+@settings
 class ForceControl:
     """How the platform answers forces, in the place of plain computed torque."""
 
-    kind: str = text(
-        "tracking: computed torque; impedance: a spring and damper to the trajectory, nothing is "
-        "measured; admittance: the trajectory gives way by what pushes; hybrid: a force along some "
-        "axes, the trajectory along the others.",
-        choices=(TRACKING, IMPEDANCE, ADMITTANCE, HYBRID),
-    )
-    task_angles_deg: np.ndarray = array(
-        "Axes of the task frame T in W, angles as those of a pose.", "deg", (3,), (0.0, 0.0, 0.0)
-    )
-    stiffness: np.ndarray | None = array(
+    kind: Annotated[
+        str,
+        OneOf((TRACKING, IMPEDANCE, ADMITTANCE, HYBRID)),
+        "tracking: computed torque; impedance: a spring and damper to the trajectory, "
+        "nothing is measured; admittance: the trajectory gives way by what pushes; "
+        "hybrid: a force along some axes, the trajectory along the others.",
+    ]
+    task_angles_deg: Annotated[
+        np.ndarray, In("deg", 3), "Axes of the task frame T in W, angles as those of a pose."
+    ] = values(0.0, 0.0, 0.0)
+    stiffness: Annotated[
+        np.ndarray | None,
+        In("N m/rad, N/m", 6, ge=0.0),
         "Along (rx, ry, rz, x, y, z) of T; kinds impedance and admittance.",
-        "N m/rad, N/m",
-        (6,),
-        None,
-        at_least=0.0,
+    ] = None
+    damping: Annotated[
+        np.ndarray | None, In("N m s/rad, N s/m", 6, ge=0.0), "The same of velocities."
+    ] = None
+    mass: Annotated[
+        np.ndarray | None, In("kg m^2, kg", 6, ge=0.0), "Virtual inertia of kind admittance."
+    ] = None
+    axes: Annotated[list[str], OneOf(AXES), "Axes of T along which kind hybrid presses."] = filled(
+        list
     )
-    damping: np.ndarray | None = array(
-        "The same of velocities.", "N m s/rad, N s/m", (6,), None, at_least=0.0
-    )
-    mass: np.ndarray | None = array(
-        "Virtual inertia of kind admittance.", "kg m^2, kg", (6,), None, at_least=0.0
-    )
-    axes: list[str] = texts("Axes of T along which kind hybrid presses.", choices=AXES)
-    force: np.ndarray | None = array(
-        "What kind hybrid presses with, in T: the force on what is touched.", "N", (3,), None
-    )
-    contact_stiffness: float | None = number(
+    force: Annotated[
+        np.ndarray | None,
+        In("N", 3),
+        "What kind hybrid presses with, in T: the force on what is touched.",
+    ] = None
+    contact_stiffness: Annotated[
+        float | None,
+        In("N/m", gt=0.0),
         "Stiffness that contact is believed to have, kind hybrid, which is damped by that.",
-        "N/m",
-        None,
-        above=0.0,
-    )
-    integral: float = number(
+    ] = None
+    integral: Annotated[
+        float,
+        In("1/s", ge=0.0),
         "Gain of the missing force, gathered while more than a fifth of it is there; kind hybrid.",
-        "1/s",
-        2.0,
-        at_least=0.0,
-    )
-    observer: str = text(
+    ] = 2.0
+    observer: Annotated[
+        str,
+        OneOf((MOMENTUM, EXTENDED)),
         "What estimates the wrench on the platform, from the commanded tensions.",
-        MOMENTUM,
-        choices=(MOMENTUM, EXTENDED),
-    )
-    bandwidth: float = number("Of that, over 2 pi.", "Hz", 10.0, above=0.0)
-    reject: bool = switch(
-        "Whether the estimated wrench is taken out, but along axes that press; with admittance "
-        "that leaves the platform on the trajectory that gives way.",
-        False,
-    )
+    ] = MOMENTUM
+    bandwidth: Annotated[float, In("Hz", gt=0.0), "Of that, over 2 pi."] = 10.0
+    reject: Annotated[
+        Switch,
+        "Whether the estimated wrench is taken out, but along axes that press; with "
+        "admittance that leaves the platform on the trajectory that gives way.",
+    ] = False
 
-    def check(self) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            ScenarioError: Something is missing, or belongs to another kind; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What is missing or belongs to another kind, and robots that it is not for."""
         needs = {IMPEDANCE: ("stiffness", "damping"), ADMITTANCE: ("stiffness", "damping", "mass")}
         for name in ("stiffness", "damping", "mass"):
-            wanted = name in needs.get(self.kind, ())
-            if (getattr(self, name) is not None) != wanted:
-                found, accepted = ("none", "six numbers") if wanted else ("numbers", "null")
-                raise ScenarioError(
-                    f"force_control.{name}: found {found} with {self.kind}; accepted: {accepted}"
-                )
+            is_needed = name in needs.get(self.kind, ())
+            if (getattr(self, name) is not None) != is_needed:
+                found, accepted = ("none", "six numbers") if is_needed else ("numbers", "null")
+                yield name, f"{found} with {self.kind}", accepted
         if self.mass is not None and not np.all(self.mass > 0.0):
-            raise ScenarioError(
-                f"force_control.mass: found {np.min(self.mass):g}; accepted: above 0"
-            )
+            yield "mass", f"{np.min(self.mass):g}", "above 0"
         hybrid = self.kind == HYBRID
         for name, there in (
             ("axes", bool(self.axes)), ("force", self.force is not None),
@@ -132,9 +132,9 @@ class ForceControl:
         ):  # fmt: skip
             if there != hybrid:
                 found, accepted = ("none", "it") if hybrid else ("one", "none")
-                raise ScenarioError(
-                    f"force_control.{name}: found {found} with {self.kind}; accepted: {accepted}"
-                )
+                yield name, f"{found} with {self.kind}", accepted
+        if not scope.robot.motion_type().is_free:
+            yield "", f"a section for {scope.robot.name}, {scope.robot.motion}", "3R3T"
 
     def pressed(self) -> Array:
         """1 for axes of T that press, else 0, shape (6,)."""
@@ -143,21 +143,6 @@ class ForceControl:
     def observes(self) -> bool:
         """Whether a wrench is estimated."""
         return self.kind in (ADMITTANCE, HYBRID) or self.reject
-
-
-def check_force_control(settings: ForceControl | None, robot: Robot) -> None:
-    """Checks the section against a robot.
-
-    Raises:
-        ScenarioError: Something is not accepted; names it.
-    """
-    if settings is None:
-        return
-    settings.check()
-    if not robot.motion_type().is_free:
-        raise ScenarioError(
-            f"force_control: found a section for {robot.name}, {robot.motion}; accepted: 3R3T"
-        )
 
 
 class ForceTracking(PoseTracking):
@@ -200,7 +185,7 @@ class ForceTracking(PoseTracking):
         Raises:
             ScenarioError: The settings are not accepted.
         """
-        check_force_control(settings, in_plant.robot)
+        refuse(settings, "force_control", robot=in_plant.robot, error=ScenarioError)
         super().__init__(in_plant, trajectory, gains, dynamics)
         robot = in_plant.robot
         self._settings, self._gains, self._cables = settings, gains, cables

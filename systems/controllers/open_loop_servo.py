@@ -2,13 +2,10 @@
 
 `OpenLoopSettings` is the scenario section `open_loop`: a planned motion of the platform instead of
 visual servoing.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -18,7 +15,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import number, section, sections
+from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.servo_law import saturation_share
 from cdpr_drake.servoing.servo_task import BelievedRobot
@@ -28,26 +25,25 @@ from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
 
-@dataclass(kw_only=True)
+@settings
 class PlatformWaypoint:
     """A pose of the platform to reach and rest in."""
 
-    pose: Pose = section("Pose of the platform in W.", Pose)
-    duration: float = number("Time from the pose before.", "s", above=0.0)
+    pose: Annotated[Pose, "Pose of the platform in W."]
+    duration: Annotated[float, In("s", gt=0.0), "Time from the pose before."]
 
 
-@dataclass(kw_only=True)
+@settings
 class OpenLoopSettings:
     """The platform follows a plan from the pose believed at the start; images are only logged."""
 
-    duration: float = number(
+    duration: Annotated[
+        float,
+        In("s", gt=0.0),
         "Time to the pose from which the target is seen as desired; without waypoints.",
-        "s",
-        10.0,
-        above=0.0,
-    )
-    waypoints: list[PlatformWaypoint] = sections(
-        "Poses to pass instead, each at rest.", required=False
+    ] = 10.0
+    waypoints: Annotated[list[PlatformWaypoint], "Poses to pass instead, each at rest."] = filled(
+        list
     )
 
 

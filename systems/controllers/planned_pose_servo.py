@@ -2,12 +2,10 @@
 
 `PosePlanSettings` is the scenario section `pose_plan`: the platform moves to the pose that the
 camera asks for, instead of by its features.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -18,7 +16,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.fields import number
+from cdpr_drake.schema.declarations import In, settings
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.servo_law import saturation_share
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
@@ -112,15 +110,15 @@ class PlannedPoseServo(FeatureServo):
         output.set_value(pose_from_row(context.get_discrete_state(self._goal).value()))
 
 
-@dataclass(kw_only=True)
+@settings
 class PosePlanSettings:
     """The way of the platform to where it sees the target as desired: straight, quintic in time."""
 
-    speed: float = number("Largest speed of the platform.", "m/s", 0.15, above=0.0)
-    rotation_speed_deg: float = number("Largest angular speed.", "deg/s", 20.0, above=0.0)
-    gain: float = number(
-        "Rate at which what is left fades at the end of the way.", "1/s", 2.0, above=0.0
-    )
+    speed: Annotated[float, In("m/s", gt=0.0), "Largest speed of the platform."] = 0.15
+    rotation_speed_deg: Annotated[float, In("deg/s", gt=0.0), "Largest angular speed."] = 20.0
+    gain: Annotated[
+        float, In("1/s", gt=0.0), "Rate at which what is left fades at the end of the way."
+    ] = 2.0
 
     def plan(self) -> GoalPlan:
         """The plan."""

@@ -1,14 +1,11 @@
-"""Scenario section `torque_control`: how a visual servo commands winches by torque.
+"""Scenario section `torque_control`: how a visual servo commands winches by torque."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from cdpr_drake.control.torque_law import ServoWrench, TensionController
-from cdpr_drake.schema.fields import FASTEST, array, number, text
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.winches.friction import FrictionLaw
 
@@ -16,7 +13,7 @@ SLACK_SHARE, SMALLEST_SLACK = 0.4, 0.05
 """Share of the smallest wanted tension below which a cable counts as slack; at least this [N]."""
 
 
-@dataclass(kw_only=True)
+@settings
 class TorqueControl:
     """From a visual servo's twist to motor torques; read with winches.mode torque only.
 
@@ -24,74 +21,66 @@ class TorqueControl:
     need a higher rate, or a smaller `proportional`.
     """
 
-    rate: float = number(
-        "Steps per second of both loops, from twist to torque.",
-        "Hz",
-        1000.0,
-        above=0.0,
-        at_most=FASTEST,
-    )
-    method: str = text(
-        "How tensions are distributed; where there are none, those answer of which the wrench is "
-        "nearest.",
-        "quadratic_program",
-        choices=METHODS,
-    )
-    limits: np.ndarray | None = array(
-        "Smallest and largest tension; null: the robot's.", "N", (2,), None, at_least=0.0
-    )
-    margin: float = number(
-        "By how much wanted tensions stay within the limits.", "N", 0.0, at_least=0.0
-    )
-    velocity_gain: float = number(
-        "Rate at which a platform's wrong velocity fades, mu.", "1/s", 20.0, above=0.0
-    )
-    integral_gain: float = number(
-        "Gain of the integral of the wrong velocity, kappa.", "1/s2", 100.0, at_least=0.0
-    )
-    proportional: float = number(
-        "Pull per missing tension, K_P of the tension loop.", "-", 4.0, at_least=0.0
-    )
-    integral: float = number(
-        "Share of a wrong winding speed's pull that is gathered per second, K_I of the tension "
-        "loop.",
-        "1/s",
-        20.0,
-        at_least=0.0,
-    )
-    derivative: float = number(
-        "Pull per wrong winding speed, K_D of the tension loop.", "N s/m", 300.0, above=0.0
-    )
-    tension_rate: float = number(
-        "Largest rate of the wanted tensions; that of a cable which has just come taut begins "
-        "where its winch goes on as before.",
-        "N/s",
-        200.0,
-        above=0.0,
-    )
-    winding_speed: float = number(
-        "How fast a winch may go beside what the platform's motion asks for, and winds up a slack "
-        "cable.",
-        "m/s",
-        0.05,
-        above=0.0,
-    )
-    slack_below: float | None = number(
-        "Measured tension below which a cable counts as slack: nothing is asked of it until it "
-        "pulls with twice that; null: 0.4 of the smallest wanted tension, at least 0.05 N.",
-        "N",
-        None,
-        at_least=0.0,
-    )
-    friction_ratio: float = number(
+    rate: Annotated[
+        float, In("Hz", gt=0.0, le=FASTEST), "Steps per second of both loops, from twist to torque."
+    ] = 1000.0
+    method: Annotated[
+        str,
+        OneOf(METHODS),
+        "How tensions are distributed; where there are none, those answer of which the "
+        "wrench is nearest.",
+    ] = "quadratic_program"
+    limits: Annotated[
+        np.ndarray | None, In("N", 2, ge=0.0), "Smallest and largest tension; null: the robot's."
+    ] = None
+    margin: Annotated[
+        float, In("N", ge=0.0), "By how much wanted tensions stay within the limits."
+    ] = 0.0
+    velocity_gain: Annotated[
+        float, In("1/s", gt=0.0), "Rate at which a platform's wrong velocity fades, mu."
+    ] = 20.0
+    integral_gain: Annotated[
+        float, In("1/s2", ge=0.0), "Gain of the integral of the wrong velocity, kappa."
+    ] = 100.0
+    proportional: Annotated[
+        float, In("-", ge=0.0), "Pull per missing tension, K_P of the tension loop."
+    ] = 4.0
+    integral: Annotated[
+        float,
+        In("1/s", ge=0.0),
+        "Share of a wrong winding speed's pull that is gathered per second, K_I of the "
+        "tension loop.",
+    ] = 20.0
+    derivative: Annotated[
+        float, In("N s/m", gt=0.0), "Pull per wrong winding speed, K_D of the tension loop."
+    ] = 300.0
+    tension_rate: Annotated[
+        float,
+        In("N/s", gt=0.0),
+        "Largest rate of the wanted tensions; that of a cable which has just come taut "
+        "begins where its winch goes on as before.",
+    ] = 200.0
+    winding_speed: Annotated[
+        float,
+        In("m/s", gt=0.0),
+        "How fast a winch may go beside what the platform's motion asks for, and winds up"
+        " a slack cable.",
+    ] = 0.05
+    slack_below: Annotated[
+        float | None,
+        In("N", ge=0.0),
+        "Measured tension below which a cable counts as slack: nothing is asked of it "
+        "until it pulls with twice that; null: 0.4 of the smallest wanted tension, at "
+        "least 0.05 N.",
+    ] = None
+    friction_ratio: Annotated[
+        float,
+        In("-", ge=0.0),
         "Friction that is compensated per that of the robot's file; 0: none.",
-        "-",
-        1.0,
-        at_least=0.0,
-    )
-    fading_speed: float = number(
-        "Cable speed below which the compensation of dry friction fades.", "m/s", 0.001, above=0.0
-    )
+    ] = 1.0
+    fading_speed: Annotated[
+        float, In("m/s", gt=0.0), "Cable speed below which the compensation of dry friction fades."
+    ] = 0.001
 
     def slack_tension(self, smallest: float) -> float:
         """Tension below which a cable counts as slack, by the smallest wanted one [N]."""

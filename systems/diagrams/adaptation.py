@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort, System
 
 from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.errors import ScenarioError
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.systems.controllers.tension_management_settings import (
     DISTRIBUTION,
@@ -39,19 +39,13 @@ BY_MODEL = (DISTRIBUTION, LENGTH, POLYGON)
 """Kinds of tension management that do."""
 
 
-def check_adaptation(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses scenarios in which points cannot be learnt, or others would go by the old ones.
-
-    Raises:
-        ScenarioError: Names the file, what was found and what is accepted.
-    """
-    if scenario.adaptation is None:
+def adaptation_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Scenarios in which points cannot be learnt, or others would go by the old ones."""
+    if scope.whole.adaptation is None or any(scope.whole.target.refusals(scope)):
         return
-    for found, accepted in _obstacles(scenario, robot):
+    for found, accepted in _obstacles(scope.whole, scope.robot):
         if found:
-            raise ScenarioError(
-                f"{path}: adaptation: found a section with {found}; accepted: {accepted}"
-            )
+            yield "adaptation", f"a section with {found}", accepted
 
 
 def _obstacles(scenario: Scenario, robot: Robot) -> list[tuple[str, str]]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from cdpr_drake.errors import VisualFeatureError
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import Refusal
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.feature_plan import FeaturePlan
 from cdpr_drake.servoing.servo_law import (
@@ -114,27 +114,25 @@ def _partition(settings: VisualServoSettings, pinhole: Pinhole) -> AxisPartition
     )
 
 
-def check_scheme(settings: Scenario, robot: Robot, target: Target) -> None:
-    """Refuses what `partitioned` and `switching` cannot do.
+def scheme_refusals(settings: Scenario, robot: Robot, target: Target) -> Iterator[Refusal]:
+    """What `partitioned` and `switching` cannot do.
 
-    Raises:
-        VisualFeatureError: A criterion of stability, which knows neither; of `partitioned` a planar
-            robot, which cannot move along an axis and across it at will, and points that a field
-            pushes from where they are desired.
+    That is a criterion of stability, which knows neither; of `partitioned` a planar robot, which
+    cannot move along an axis and across it at will, and points that a field pushes from where they
+    are desired.
     """
     c = settings.controller
     if c.scheme in ("partitioned", "switching") and settings.stability is not None:
-        raise VisualFeatureError(
-            f"stability: found a section with controller.scheme {c.scheme}, whose law the "
-            "criterion does not know; accepted: null, or pbvs, pbvs-line, 2.5d, ibvs, circles"
+        found = (
+            f"a section with controller.scheme {c.scheme}, whose law the criterion does not know"
         )
+        yield "stability", found, "null, or pbvs, pbvs-line, 2.5d, ibvs, circles"
     if c.scheme != "partitioned":
         return
     if robot.motion_type().is_horizontal_body:
-        raise VisualFeatureError(
-            f"controller.scheme: found partitioned on {robot.name}, a planar robot; accepted "
-            "there: pbvs, pbvs-line, ibvs, 2.5d, switching"
-        )
+        found = f"partitioned on {robot.name}, a planar robot"
+        yield "controller.scheme", found, "there: pbvs, pbvs-line, ibvs, 2.5d, switching"
+        return
     pinhole = servo_pinhole(settings.camera, robot)
     field = _partition(settings, pinhole).field
     if field is None or not isinstance(target, PointTarget):
@@ -145,11 +143,12 @@ def check_scheme(settings: Scenario, robot: Robot, target: Target) -> None:
         left, right, top, bottom = field.edges
         room = float(np.min([x - left, right - x, y - top, bottom - y]))
         if room <= field.distance:
-            raise VisualFeatureError(
-                f"controller.partition.edge_distance: found {field.distance * scale:g} [px]; "
-                f"accepted: below {max(room * scale, 0.0):.0f}, the distance of a point from an "
-                "edge at the desired pose, where the field would push it away"
+            found, most = f"{field.distance * scale:g} [px]", max(room * scale, 0.0)
+            accepted = (
+                f"below {most:.0f}, the distance of a point from an edge at the desired pose, "
+                "where the field would push it away"
             )
+            yield "controller.partition.edge_distance", found, accepted
 
 
 def _switching(settings: VisualServoSettings) -> ModeSwitching:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,13 +10,14 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import ScenarioError, SensorError
+from cdpr_drake.errors import SensorError
 from cdpr_drake.estimation.break_detection import silent_reading
 from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch, repeats_in_a_row
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.sensor_catalogue import TensionSensorModel, load_tension_sensor
+from cdpr_drake.schema.declarations import Refusal, Scope, told
 from cdpr_drake.statics.nearest_held_pose import Load, nearest_held_pose
 from cdpr_drake.systems.controllers.emergency import (
     ACCEPTED,
@@ -52,56 +53,39 @@ if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 
-def check_emergency(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses reactions that the scenario's winches cannot do.
-
-    Raises:
-        ScenarioError: Names the field, what was found and what is accepted.
-    """
-    settings = scenario.emergency
+def emergency_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Reactions that the scenario's winches cannot do."""
+    scenario, robot, settings = scope.whole, scope.robot, scope.whole.emergency
     if settings is None:
         return
-    where = f"{path}: emergency"
+    mode, reaction = scenario.winches.mode, settings.reaction
     if scenario.failures is None:
-        raise ScenarioError(
-            f"{where}: found a section without failures; accepted: null, or with a section "
-            "failures, which may be {}"
-        )
+        accepted = "null, or with a section failures, which may be {}"
+        yield "emergency", "a section without failures", accepted
     if robot.winch_groups().are_shared():
-        raise ScenarioError(
-            f"{where}: found a section with {robot.name}, which has several cables on one winch; "
-            "accepted: null"
-        )
-    if settings.reaction != REDISTRIBUTE and settings.motion == CONTINUE:
-        raise ScenarioError(
-            f"{where}.motion: found {CONTINUE} with reaction {settings.reaction}; accepted: {HOLD}"
-        )
-    if settings.watch is not None:
-        if scenario.winches.mode != TORQUE:
-            raise ScenarioError(
-                f"{where}.watch: found a section with winches.mode {scenario.winches.mode}; "
-                f"accepted: null, or winches.mode {TORQUE}"
-            )
+        found = f"a section with {robot.name}, which has several cables on one winch"
+        yield "emergency", found, "null"
+        return
+    if reaction != REDISTRIBUTE and settings.motion == CONTINUE:
+        yield "emergency.motion", f"{CONTINUE} with reaction {reaction}", HOLD
+    if settings.watch is not None and mode != TORQUE:
+        found = f"a section with winches.mode {mode}"
+        yield "emergency.watch", found, f"null, or winches.mode {TORQUE}"
+    elif settings.watch is not None:
         try:
             watch_rules(scenario, settings, settings.watch, robot)
         except SensorError as problem:
-            raise ScenarioError(f"{where}.watch: {problem}") from problem
-    if settings.reaction != STOP and scenario.winches.mode != TORQUE:
-        raise ScenarioError(
-            f"{where}.reaction: found {settings.reaction} with winches.mode "
-            f"{scenario.winches.mode}; accepted: {STOP}, or winches.mode {TORQUE}"
-        )
-    if settings.reaction in (RETREAT, DESCEND) and not robot.motion_type().is_free:
-        raise ScenarioError(
-            f"{where}.reaction: found {settings.reaction} with {robot.name}, whose platform does "
-            f"not move freely; accepted: {STOP}, {REDISTRIBUTE}, {BRAKE}"
-        )
+            yield told(problem, "emergency.watch")
+    if reaction != STOP and mode != TORQUE:
+        found = f"{reaction} with winches.mode {mode}"
+        yield "emergency.reaction", found, f"{STOP}, or winches.mode {TORQUE}"
+    if reaction in (RETREAT, DESCEND) and not robot.motion_type().is_free:
+        found = f"{reaction} with {robot.name}, whose platform does not move freely"
+        yield "emergency.reaction", found, f"{STOP}, {REDISTRIBUTE}, {BRAKE}"
     most = wanted_limits(scenario.torque_control or TorqueControl(), robot)[1]
-    if settings.reaction == RETREAT and settings.least_tension >= most:
-        raise ScenarioError(
-            f"{where}.least_tension: found {settings.least_tension:g}; accepted: below {most:g} "
-            "[N], the largest wanted tension"
-        )
+    if reaction == RETREAT and settings.least_tension >= most:
+        accepted = f"below {most:g} [N], the largest wanted tension"
+        yield "emergency.least_tension", f"{settings.least_tension:g}", accepted
 
 
 def watch_rules(

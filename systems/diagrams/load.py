@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,6 @@ from pydrake.math import RigidTransform
 from cdpr_drake.control.force_balance import FORCE, WRENCH, force_problem
 from cdpr_drake.errors import (
     CableGeometryError,
-    Problems,
     RobotFileError,
     ScenarioError,
     TensionProblemError,
@@ -24,32 +25,36 @@ from cdpr_drake.models.robot_holding import check_pulleys
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
-from cdpr_drake.systems.controllers.force_tracking import check_force_control
-from cdpr_drake.systems.diagrams.mechanism_control import check_mechanism_scenario
-from cdpr_drake.systems.diagrams.scenario_checks import check_scenario
+from cdpr_drake.schema.declarations import Refusal, Scope, told
+from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.systems.diagrams.mechanism_control import (
+    mechanism_refusals,
+)
+from cdpr_drake.systems.diagrams.scenario_checks import SERVO_REFUSALS
 from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
-from cdpr_drake.systems.remote.settings import check_place
-from cdpr_drake.systems.robots.disturbances import check_disturbances
+from cdpr_drake.systems.remote.settings import place_refusals
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import (
     MECHANISM,
     PICK_AND_PLACE,
     TENSION_CONTROL,
     VISUAL_SERVO,
-    load_with_mechanism,
-    load_with_robot,
+    belief_refusals,
+    mechanism_scope,
+    robot_scope,
     scenario_file,
     scenario_kind,
+    unknown_robot,
 )
 from cdpr_drake.systems.scenarios.mechanism_scenario import MechanismScenario
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
     PickAndPlaceScenario,
-    check_pick_and_place,
+    pick_and_place_refusals,
 )
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.worlds.checks import check_world
+from cdpr_drake.systems.worlds.checks import world_refusals
 from cdpr_drake.systems.worlds.world import make_world
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.shortfall import shortfall
@@ -76,99 +81,88 @@ def read_inputs(scenario: Scenario) -> None:
         make_world(scenario.world, robot)
 
 
-def _check_tension_scenario(scenario: TensionScenario, robot: Robot, path: Path) -> None:
-    check_place(scenario.remote, TENSION_PLACES, path)
+def _control_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What of a scenario of dynamic control does not go together."""
+    scenario, robot = scope.whole, scope.robot
+    yield from place_refusals(scenario.remote, TENSION_PLACES)
     if robot.winch_groups().are_shared():
-        raise ScenarioError(
-            f"{path}: robot: found {robot.name} with several cables on one winch, which cannot be "
-            "given tensions one by one; accepted: a robot with a winch for each cable"
-        )
-    poses = _poses_of(scenario, robot, path)
-    check_world(
-        scenario.world, robot, next(iter(poses.values())), path,
+        found = f"{robot.name} with several cables on one winch, which cannot be given tensions"
+        yield "robot", f"{found} one by one", "a robot with a winch for each cable"
+    beside = {
+        "perturbations.believed_robot": scenario.perturbations.believed_robot,
+        "force_control": scenario.force_control,
+    }
+    for key, other in product(beside, ("remote", "predictive")):
+        if beside[key] is not None and getattr(scenario, other) is not None:
+            yield key, f"beside {other}", "one of both"
+    for key in ("force_control", "disturbances"):
+        if getattr(scenario, key) is not None and scenario.integration.engine == COMPILED:
+            yield "integration.engine", f"{COMPILED} beside {key}", "plant"
+    for key in ("predictive", "force_control"):
+        if getattr(scenario, key) is not None and scenario.controller.balance != WRENCH:
+            found = f"{scenario.controller.balance} beside {key}"
+            yield "controller.balance", found, WRENCH
+
+
+def _tension_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What a scenario of dynamic control is refused for beside what its sections say."""
+    scenario, robot = scope.whole, scope.robot
+    wrong = [*_control_refusals(scope), *_motion_refusals(scope)]
+    yield from wrong
+    if wrong:
+        return
+    poses = _poses_of(scenario)
+    yield from world_refusals(
+        scenario.world, robot, next(iter(poses.values())),
         compiled=scenario.integration.engine == COMPILED, stop=scenario.stop.contact,
     )  # fmt: skip
-    if scenario.perturbations.believed_robot is not None:
-        for key in ("remote", "predictive"):
-            if getattr(scenario, key) is not None:
-                raise ScenarioError(
-                    f"{path}: perturbations.believed_robot: found beside {key}; accepted: one of "
-                    "both"
-                )
-    check_disturbances(scenario.disturbances, path)
-    _check_forces(scenario, robot, path)
-    if scenario.predictive is not None and scenario.controller.balance != WRENCH:
-        raise ScenarioError(
-            f"{path}: controller.balance: found {scenario.controller.balance} beside predictive; "
-            f"accepted: {WRENCH}"
-        )
-    problems, said = Problems(ScenarioError), set()
+    said = set[str]()
     for key, X_WP in poses.items():
         words = _why_not_held(X_WP, scenario, robot)
         if words and words not in said:  # settings that are wrong are wrong for every pose
             said.add(words)
-            problems.add(f"{path}: {key}: {words}")
-    problems.raise_any()
+            yield key, words, ""
 
 
-def _check_forces(scenario: TensionScenario, robot: Robot, path: Path) -> None:
-    """Refuses laws that answer forces, and pushes, beside what does not go with them."""
-    for key in ("force_control", "disturbances"):
-        if getattr(scenario, key) is not None and scenario.integration.engine == COMPILED:
-            raise ScenarioError(
-                f"{path}: integration.engine: found {COMPILED} beside {key}; accepted: plant"
-            )
-    if scenario.force_control is None:
-        return
-    try:
-        check_force_control(scenario.force_control, robot)
-    except ScenarioError as problem:
-        raise ScenarioError(f"{path}: {problem}") from problem
-    for key in ("remote", "predictive"):
-        if getattr(scenario, key) is not None:
-            raise ScenarioError(f"{path}: force_control: found beside {key}; accepted: one of both")
-    if scenario.controller.balance != WRENCH:
-        raise ScenarioError(
-            f"{path}: controller.balance: found {scenario.controller.balance} beside "
-            f"force_control; accepted: {WRENCH}"
-        )
-
-
-def _poses_of(scenario: TensionScenario, robot: Robot, path: Path) -> dict[str, RigidTransform]:
-    """Where the platform rests along a trajectory, by key, at time 0 first [m].
+def _motion_refusals(scope: Scope) -> Iterator[Refusal]:
+    """A trajectory that is none, or leads where the platform cannot be.
 
     Between its ends a motion from a file may pass poses that nothing holds; there the platform
     must only be where it can.
     """
-    asked = scenario.trajectory
-    if asked.file is not None:
+    scenario, settings = scope.whole, scope.whole.trajectory
+    if settings.file is None:
+        if settings.start is None:
+            yield "trajectory.start", "none", "a pose, or trajectory.file"
+        if not settings.stretches:
+            yield "trajectory.stretches", "none", "at least one"
+        return
+    try:
+        motion = settings.trajectory()
+    except TrajectoryError as problem:
+        yield told(problem, "trajectory.file")
+        return
+    for t in np.linspace(motion.start_time, motion.end_time, FILE_LOOKS):
         try:
-            motion = asked.trajectory()
-            for t in np.linspace(motion.start_time, motion.end_time, FILE_LOOKS):
-                check_pose(robot, motion.pose(float(t)))
-        except TrajectoryError as problem:
-            raise ScenarioError(f"{path}: trajectory.file: {problem}") from problem
+            check_pose(scope.robot, motion.pose(float(t)))
         except TensionProblemError as problem:
-            raise ScenarioError(
-                f"{path}: trajectory.file: {asked.file}: at {t:.4g} s: {problem}"
-            ) from problem
-        if scenario.duration <= motion.start_time:
-            raise ScenarioError(
-                f"{path}: duration: found {scenario.duration:g} s; accepted: longer than "
-                f"{motion.start_time:g} s, when the motion of trajectory.file begins"
-            )
-        return {
-            "trajectory.file, its start": motion.poses[0],
-            "trajectory.file, its end": motion.poses[-1],
-        }
-    if asked.start is None:
-        raise ScenarioError(
-            f"{path}: trajectory.start: found none; accepted: a pose, or trajectory.file"
-        )
-    if not asked.stretches:
-        raise ScenarioError(f"{path}: trajectory.stretches: found none; accepted: at least one")
-    poses = {"trajectory.start": asked.start.transform()}
-    for k, stretch in enumerate(asked.stretches):
+            found = f"{settings.file}: at {t:.4g} s: {problem}"
+            yield "trajectory.file", found, "poses that the platform can have"
+            return
+    if scenario.duration <= motion.start_time:
+        begins = f"{motion.start_time:g} s, when the motion of trajectory.file begins"
+        yield "duration", f"{scenario.duration:g} s", f"longer than {begins}"
+
+
+def _poses_of(scenario: TensionScenario) -> dict[str, RigidTransform]:
+    """Where the platform rests along a trajectory, by key, at time 0 first [m]."""
+    settings = scenario.trajectory
+    if settings.file is not None:
+        motion = settings.trajectory()
+        return {"trajectory.file": motion.poses[0], "trajectory": motion.poses[-1]}
+    assert settings.start is not None
+    poses = {"trajectory.start": settings.start.transform()}
+    for k, stretch in enumerate(settings.stretches):
         poses[f"trajectory.stretches[{k}].pose"] = stretch.pose.transform()
     return poses
 
@@ -224,14 +218,14 @@ def check_robot_motion(robot: Robot, where: Path | str) -> None:
         )
 
 
-SCENARIO_SCHEMAS: dict[str, tuple[type[Any], Callable[[Any, Any, Path], None]]] = {
-    VISUAL_SERVO: (Scenario, check_scenario),
-    TENSION_CONTROL: (TensionScenario, _check_tension_scenario),
-    PICK_AND_PLACE: (PickAndPlaceScenario, check_pick_and_place),
-    MECHANISM: (MechanismScenario, check_mechanism_scenario),
+SCENARIO_SCHEMAS: dict[str, tuple[type[Any], tuple[Callable[[Scope], Iterator[Refusal]], ...]]] = {
+    VISUAL_SERVO: (Scenario, (belief_refusals, *SERVO_REFUSALS)),
+    TENSION_CONTROL: (TensionScenario, (belief_refusals, _tension_refusals)),
+    PICK_AND_PLACE: (PickAndPlaceScenario, (pick_and_place_refusals,)),
+    MECHANISM: (MechanismScenario, (mechanism_refusals,)),
 }
-"""Schema of each kind of scenario, and its check against robot or mechanism, by what its file gives
-as `kind`."""
+"""Schema of each kind of scenario, and what it is refused for beside its sections, with its robot
+or mechanism, by what its file gives as `kind`."""
 
 
 def load_scenario(
@@ -255,17 +249,25 @@ def load_scenario(
     """
     name = str(name)
     kind = scenario_kind(name)
-    of_kind, check = SCENARIO_SCHEMAS[kind]
+    path, (of_kind, more) = scenario_file(name), SCENARIO_SCHEMAS[kind]
     if schema is not None and not issubclass(schema, of_kind):
         raise ScenarioError(
-            f"{scenario_file(name)}: kind: found {kind}, not described by {schema.__name__}; "
+            f"{path}: kind: found {kind}, not described by {schema.__name__}; "
             f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
         )
-    if not issubclass(of_kind, ScenarioHeader):
-        scenario, mechanism, path = load_with_mechanism(schema or of_kind, name, overrides)
-        check(scenario, mechanism, path)
-        return scenario
-    scenario, robot, path = load_with_robot(schema or of_kind, name, overrides)
-    check_robot_motion(robot, path)
-    check(scenario, robot, path)
-    return scenario
+    moves_robot = issubclass(of_kind, ScenarioHeader)
+
+    def scope(scenario: Any) -> Scope:
+        found = (robot_scope if moves_robot else mechanism_scope)(scenario, path)
+        if moves_robot:
+            check_robot_motion(found.robot, path)
+        return replace(found, more=more)
+
+    try:
+        return load_typed(
+            schema or of_kind, path, error=ScenarioError, overrides=overrides, scope=scope
+        )
+    except ScenarioError as problem:
+        if not moves_robot:
+            raise
+        raise ScenarioError(*problem.problems, *unknown_robot(path, overrides)) from problem

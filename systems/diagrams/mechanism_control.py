@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -18,7 +18,6 @@ from cdpr_drake.errors import (
     CdprError,
     EquilibriumError,
     InfeasibleTensionError,
-    Problems,
     ScenarioError,
     TensionProblemError,
 )
@@ -29,6 +28,7 @@ from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.plant_cables import PlantCables
 from cdpr_drake.models.plant_rest import Rest, hang, rows_of_motors, scoped_joint
 from cdpr_drake.models.plant_statics import plant_tension_problem
+from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.systems.controllers.plant_following import (
     LengthFollower,
     MotorFollower,
@@ -46,7 +46,6 @@ from cdpr_drake.systems.scenarios.mechanism_scenario import (
     COMPUTED_TORQUE,
     USUAL_METHOD,
     MechanismScenario,
-    check_settings,
 )
 from cdpr_drake.tensions.methods import distribute
 from cdpr_drake.tensions.problem import TensionStatus
@@ -375,44 +374,33 @@ def _built(builder: DiagramBuilder, mechanism: Mechanism) -> Diagram:
     return diagram
 
 
-def check_mechanism_scenario(scenario: MechanismScenario, mechanism: Mechanism, path: Path) -> None:
-    """What a file asks of its mechanism.
-
-    Raises:
-        ScenarioError: Settings that do not go together, waypoints that the mechanism cannot have or
-            hold, or cables that cannot be simulated so; names the file and the key.
-    """
-    check_settings(scenario, path)
+def mechanism_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Waypoints that the mechanism cannot have or hold, or cables that cannot be simulated so."""
+    if any(scope.whole.refusals(scope)):
+        return
     try:
-        follower = build_mechanism_follower(scenario, mechanism)
+        follower = build_mechanism_follower(scope.whole, scope.robot)
     except ScenarioError as problem:
-        raise ScenarioError(*(f"{path}: {line}" for line in problem.problems)) from problem
+        raise ScenarioError(*(f"{scope.path}: {line}" for line in problem.problems)) from problem
     except CdprError as problem:
-        raise ScenarioError(f"{path}: {problem}") from problem
-    problems = Problems(ScenarioError)
+        raise ScenarioError(f"{scope.path}: {problem}") from problem
     for k, words in _not_held(follower):
-        key = "home" if not k else f"motion.waypoints[{k - 1}]"
-        problems.add(f"{path}: {key}: {words}")
-    problems.raise_any()
+        yield "home" if not k else f"motion.waypoints[{k - 1}]", words, ""
 
 
-def _not_held(follower: MechanismFollower) -> list[tuple[int, str]]:
+def _not_held(follower: MechanismFollower) -> Iterator[tuple[int, str]]:
     """Waypoints at which no tensions hold the mechanism where computed torque asks for them."""
     if follower.rest is not None:
-        return []
-    found, context = [], follower.plant.CreateDefaultContext()
+        return
+    context = follower.plant.CreateDefaultContext()
     low, high = follower.limits
     for k, q in enumerate(follower.motion.positions):
         follower.plant.SetPositions(context, q)
         try:
             problem = plant_tension_problem(follower.cables, context, limits=follower.limits)
-            held = distribute(problem, USUAL_METHOD).status == TensionStatus.FEASIBLE
-            words = "" if held else (
-                f"found positions where no tensions within {low:g}..{high:g} N hold the mechanism; "
-                "accepted: positions that can be held"
-            )  # fmt: skip
+            if distribute(problem, USUAL_METHOD).status != TensionStatus.FEASIBLE:
+                bounds = f"within {low:g}..{high:g} N"
+                found = f"found positions where no tensions {bounds} hold the mechanism"
+                yield k, f"{found}; accepted: positions that can be held"
         except CdprError as problem_there:
-            words = str(problem_there)
-        if words:
-            found.append((k, words))
-    return found
+            yield k, str(problem_there)

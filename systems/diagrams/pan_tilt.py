@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,8 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import ScenarioError
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.servoing.turned_view import pointing_angles
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
@@ -26,7 +25,7 @@ from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+    pass
 
 UNFIT_ESTIMATORS = ("fusion", "sensor_fusion", "known_tag", "eye_to_hand")
 """Estimators with cameras or errors of images of their own, which know nothing of joints."""
@@ -163,42 +162,20 @@ def turning_ports(turning: TurningCamera, measurement: TargetMeasurement) -> dic
     }
 
 
-def check_pan_tilt(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses joints that cannot be, and what does not take a camera that turns.
-
-    Raises:
-        ScenarioError: Names the field, what was found and what is accepted.
-    """
-    settings = scenario.camera.pan_tilt
-    if settings is None:
+def pan_tilt_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What does not take a camera that turns."""
+    scenario = scope.whole
+    if scenario.camera.pan_tilt is None or any(scenario.target.refusals(scope)):
         return
-    where = f"{path}: camera.pan_tilt"
-    lower, upper, start = settings.lower_deg, settings.upper_deg, settings.start_deg
-    if np.any(lower > upper):
-        raise ScenarioError(
-            f"{where}.lower_deg: found {_pair(lower)}; accepted: at most upper_deg, {_pair(upper)}"
-        )
-    if np.any(np.maximum(np.abs(lower), np.abs(upper)) > 180.0):
-        raise ScenarioError(
-            f"{where}: found limits {_pair(lower)} and {_pair(upper)}; accepted: -180 to 180 [deg]"
-        )
-    if np.any(start < lower) or np.any(start > upper):
-        raise ScenarioError(
-            f"{where}.start_deg: found {_pair(start)}; accepted: {_pair(lower)} to {_pair(upper)}"
-        )
     if not isinstance(scenario.target.target(), PointTarget):
-        raise ScenarioError(
-            f"{path}: target.kind: found {scenario.target.kind} with camera.pan_tilt; accepted: "
-            "targets whose marks are points"
-        )
+        found = f"{scenario.target.kind} with camera.pan_tilt"
+        yield "target.kind", found, "targets whose marks are points"
     kinds = {"estimator.kind": scenario.estimator.kind}
     kinds |= {f"estimator.compare[{k}]": x for k, x in enumerate(scenario.estimator.compare)}
     for key, kind in kinds.items():
         if kind in UNFIT_ESTIMATORS:
-            raise ScenarioError(
-                f"{path}: {key}: found {kind} with camera.pan_tilt; accepted: none of "
-                + ", ".join(UNFIT_ESTIMATORS)
-            )
+            accepted = f"none of {', '.join(UNFIT_ESTIMATORS)}"
+            yield key, f"{kind} with camera.pan_tilt", accepted
     sections = {
         "estimator.known_tag": scenario.estimator.known_tag,
         "adaptation": scenario.adaptation,
@@ -206,17 +183,5 @@ def check_pan_tilt(scenario: Scenario, robot: Robot, path: Path) -> None:
     }
     for key, section in sections.items():
         if section is not None:
-            raise ScenarioError(
-                f"{path}: {key}: found a section with camera.pan_tilt, of whose joints it knows "
-                f"nothing; accepted: null{LATER.get(key, '')}"
-            )
-    flaws = scenario.camera.flaws
-    if flaws is not None and flaws.flaws().moves:
-        raise ScenarioError(
-            f"{path}: camera.flaws: found images that take time with camera.pan_tilt; accepted: "
-            "exposure and readout 0"
-        )
-
-
-def _pair(angles: np.ndarray) -> str:
-    return f"({angles[0]:g}, {angles[1]:g}) [deg]"
+            found = "a section with camera.pan_tilt, of whose joints it knows nothing"
+            yield key, found, f"null{LATER.get(key, '')}"

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +18,7 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.rendered_camera import add_renderer
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.schema.declarations import Refusal, Scope, told
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.cameras.cable_camera import CableCamera
 from cdpr_drake.systems.cameras.cable_picture_camera import CablePicture, CablePictureCamera
@@ -45,6 +45,7 @@ from cdpr_drake.systems.controllers.tension_management_settings import (
     POLYGON,
     TensionManagement,
 )
+from cdpr_drake.systems.diagrams.torque_control import is_whole_step
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
@@ -55,7 +56,7 @@ from cdpr_drake.vision.cable_detection import SightSettings
 from cdpr_drake.vision.pinhole import Pinhole
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+    pass
 
 SEEN_POINTS = 15
 """Points of each cable that are looked for in an image."""
@@ -64,18 +65,12 @@ WHOLE = 1e-6
 """A period over a step that is this near to a whole number is one: decimal rates are rounded."""
 
 
-def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses thresholds, lengths, methods and rates that the robot or the simulation exclude."""
-    settings = scenario.tension_management
+def management_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Thresholds, lengths, methods and rates that the robot or the simulation exclude."""
+    scenario, robot, settings = scope.whole, scope.robot, scope.whole.tension_management
     if settings is None:
         return
-
-    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
-        return ScenarioError(
-            f"{path}: tension_management.{key}: found {found}; accepted: {accepted}"
-        )
-
-    m, upper = len(robot.cables), robot.tension_bounds.upper
+    m, upper, section = len(robot.cables), robot.tension_bounds.upper, "tension_management"
     distributed = {DISTRIBUTION: "method", POLYGON: "set_point"}.get(settings.kind)
     for key in ("threshold", "highest"):
         values = getattr(settings, key)
@@ -84,73 +79,69 @@ def check_tension_management(scenario: Scenario, robot: Robot, path: Path) -> No
         if len(values) not in (1, m) or (distributed and len(values) != 1):
             each = f"one, or one for each of the {m} cables of {robot.name}"
             accepted = f"one, by kind {settings.kind}" if distributed else each
-            raise refuse(key, f"{len(values)} values", accepted)
+            yield f"{section}.{key}", f"{len(values)} values", accepted
+            return
         if np.any(values < 0.0):
-            raise refuse(key, f"{np.min(values):g}", "at least 0 [N]: cables do not push")
+            accepted = "at least 0 [N]: cables do not push"
+            yield f"{section}.{key}", f"{np.min(values):g}", accepted
         if np.any(values >= upper):
-            raise refuse(
-                key, f"{np.max(values):g}", f"below {upper:g} [N], the upper bound of {robot.name}"
-            )
+            accepted = f"below {upper:g} [N], the upper bound of {robot.name}"
+            yield f"{section}.{key}", f"{np.max(values):g}", accepted
     if settings.kind == BY_LENGTH:
-        _check_by_length(settings, refuse)
+        yield from _by_length(settings)
     if settings.kind == IMAGE:
-        _check_sight(settings, robot, refuse, scenario.camera.kind == RENDERED)
+        yield from _sight_refusals(settings, robot, scenario.camera.kind == RENDERED)
     if distributed:
         try:
             method = getattr(settings, distributed)
             method_for(method, m - robot.motion_type().freedom, False)
         except TensionProblemError as problem:
-            raise ScenarioError(f"{path}: tension_management.{distributed}: {problem}") from problem
+            yield told(problem, f"{section}.{distributed}")
         most = (upper - float(settings.threshold[0])) / 2.0
         if settings.kind == POLYGON and settings.margin > most:
-            raise refuse(
-                "margin", f"{settings.margin:g}",
-                f"at most {most:g} [N], half of what lies between threshold and upper bound",
-            )  # fmt: skip
+            accepted = f"at most {most:g} [N], half of what lies between threshold and upper bound"
+            yield f"{section}.margin", f"{settings.margin:g}", accepted
     rate, step = settings.rate or scenario.controller.rate, scenario.integration.max_step
-    if step is not None:
-        steps = 1.0 / (rate * step)
-        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=WHOLE):
-            raise refuse(
-                "rate",
-                f"{rate:g}",
-                f"a whole number of steps of integration.max_step = {step:g} s for each correction",
-            )
+    if step is not None and not is_whole_step(rate, step):
+        steps = f"a whole number of steps of integration.max_step = {step:g} s"
+        yield f"{section}.rate", f"{rate:g}", f"{steps} for each correction"
 
 
-def _check_sight(settings: TensionManagement, robot: Robot, refuse: object, rendered: bool) -> None:
-    assert callable(refuse)
-    mounts = {mount.name: mount.model for mount in robot.cameras if mount.parent == "world"}
-    if settings.sight_mount not in mounts:
-        accepted = f"a camera in the world of {robot.name}: {', '.join(mounts) or 'it has none'}"
-        raise refuse("sight_mount", settings.sight_mount, accepted)
-    fastest = load_camera(mounts[settings.sight_mount]).rate_hz
+def _sight_refusals(settings: TensionManagement, robot: Robot, rendered: bool) -> Iterator[Refusal]:
+    key, mount = "tension_management.sight_mount", settings.sight_mount
+    mounts = {each.name: each.model for each in robot.cameras if each.parent == "world"}
+    if mount not in mounts:
+        known = ", ".join(mounts) or "it has none"
+        yield key, mount, f"a camera in the world of {robot.name}: {known}"
+        return
+    fastest = load_camera(mounts[mount]).rate_hz
     if settings.sight_rate > fastest:
-        raise refuse("sight_rate", f"{settings.sight_rate:g}", f"at most {fastest:g} [Hz]")
+        found = f"{settings.sight_rate:g}"
+        yield "tension_management.sight_rate", found, f"at most {fastest:g} [Hz]"
     if rendered and not _sight(robot, settings).is_ideal:
-        raise refuse(
-            "sight_mount", f"{settings.sight_mount}, whose lens distorts",
-            "with a rendered camera one without distortion",
-        )  # fmt: skip
+        accepted = "with a rendered camera one without distortion"
+        yield key, f"{mount}, whose lens distorts", accepted
 
 
-def _check_by_length(settings: TensionManagement, refuse: object) -> None:
-    assert callable(refuse)
-    for key in ("highest", "shortest", "longest"):
-        if getattr(settings, key) is None:
-            raise refuse(key, "none", "a number, by kind by_length")
+def _by_length(settings: TensionManagement) -> Iterator[Refusal]:
+    section = "tension_management"
+    missing = [key for key in ("highest", "shortest", "longest") if getattr(settings, key) is None]
+    for key in missing:
+        yield f"{section}.{key}", "none", "a number, by kind by_length"
+    if missing:
+        return
     assert settings.shortest is not None
     assert settings.longest is not None
     assert settings.highest is not None
     if settings.longest <= settings.shortest:
-        raise refuse(
-            "longest", f"{settings.longest:g}", f"above shortest, {settings.shortest:g} [m]"
-        )
+        accepted = f"above shortest, {settings.shortest:g} [m]"
+        yield f"{section}.longest", f"{settings.longest:g}", accepted
     low, high = np.broadcast_arrays(settings.threshold, settings.highest)
     if np.any(high < low):
-        raise refuse("highest", f"{np.min(high - low):g} N above threshold", "not below threshold")
+        found = f"{np.min(high - low):g} N above threshold"
+        yield f"{section}.highest", found, "not below threshold"
     if settings.shape == "exponential" and np.any(low <= 0.0):
-        raise refuse("threshold", f"{np.min(low):g}", "above 0 [N] by shape exponential")
+        yield f"{section}.threshold", f"{np.min(low):g}", "above 0 [N] by shape exponential"
 
 
 def automatic_gain(

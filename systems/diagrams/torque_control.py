@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +12,13 @@ from pydrake.systems.framework import DiagramBuilder, System
 from pydrake.systems.primitives import MatrixGain
 
 from cdpr_drake.control.torque_law import TorqueServoLaw
-from cdpr_drake.errors import Problems, ScenarioError, TensionProblemError
+from cdpr_drake.errors import TensionProblemError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
+from cdpr_drake.schema.declarations import Refusal, Scope, told
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.torque_controller import TorqueController
@@ -38,105 +39,86 @@ WHOLE = 1e-6
 """A period over a step that is this near to a whole number is one: decimal rates are rounded."""
 
 
-def check_torque_control(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses what contradicts winches by torque, or what these make no sense with."""
-    settings, mode = scenario.torque_control, scenario.winches.mode
-
-    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
-        return ScenarioError(f"{path}: {key}: found {found}; accepted: {accepted}")
-
+def torque_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What contradicts winches by torque, or what these make no sense with."""
+    scenario, robot, mode = scope.whole, scope.robot, scope.whole.winches.mode
     if mode != TORQUE:
-        if settings is not None:
-            raise refuse(
-                "torque_control", f"a section with winches.mode {mode}", "null, or mode torque"
-            )
+        if scenario.torque_control is not None:
+            found = f"a section with winches.mode {mode}"
+            yield "torque_control", found, "null, or mode torque"
         return
     if scenario.tension_management is not None:
-        raise refuse(
-            "tension_management",
-            "a section with winches.mode torque",
-            "null: tensions are what torques are commanded for",
-        )
-    settings = settings or TorqueControl()
+        accepted = "null: tensions are what torques are commanded for"
+        yield "tension_management", "a section with winches.mode torque", accepted
+    settings = scenario.torque_control or TorqueControl()
     low, high = wanted_limits(settings, robot)
     if low > high:
-        raise refuse(
-            "torque_control.margin",
-            f"{settings.margin:g} with limits {low - settings.margin:g} to "
-            f"{high + settings.margin:g} N",
-            "at most half of what is between them, the first one not above the second",
-        )
+        margin = settings.margin
+        found = f"{margin:g} with limits {low - margin:g} to {high + margin:g} N"
+        accepted = "at most half of what is between them, the first one not above the second"
+        yield "torque_control.margin", found, accepted
     slack, most = settings.slack_below, max(0.5 * low, SMALLEST_SLACK)
     if slack is not None and slack > most:
-        raise refuse(
-            "torque_control.slack_below",
-            f"{slack:g}",
-            f"at most {most:g} [N], half of the smallest wanted tension",
-        )
+        accepted = f"at most {most:g} [N], half of the smallest wanted tension"
+        yield "torque_control.slack_below", f"{slack:g}", accepted
     try:
         method_for(settings.method, len(robot.cables) - robot.motion_type().freedom, False)
     except TensionProblemError as problem:
-        raise ScenarioError(f"{path}: torque_control.method: {problem}") from problem
-    rate, step = settings.rate, scenario.integration.max_step
-    if rate < scenario.controller.rate:
-        raise refuse(
-            "torque_control.rate",
-            f"{rate:g}",
-            f"at least controller.rate = {scenario.controller.rate:g} [Hz]",
+        yield told(problem, "torque_control.method")
+    rate, step, servo = settings.rate, scenario.integration.max_step, scenario.controller.rate
+    if rate < servo:
+        yield "torque_control.rate", f"{rate:g}", f"at least controller.rate = {servo:g} [Hz]"
+    if step is not None and not is_whole_step(rate, step):
+        accepted = (
+            f"a whole number of steps of integration.max_step = {step:g} s for each of control"
         )
-    if step is not None:
-        steps = 1.0 / (rate * step)
-        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=WHOLE):
-            raise refuse(
-                "torque_control.rate",
-                f"{rate:g}",
-                f"a whole number of steps of integration.max_step = {step:g} s for each of control",
-            )
+        yield "torque_control.rate", f"{rate:g}", accepted
 
 
-def check_winch_groups(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """What does not work with several cables on one winch, each named."""
-    groups, problems = robot.winch_groups(), Problems(ScenarioError)
+def is_whole_step(rate: float, step: float) -> bool:
+    """Whether a period of a rate [Hz] has a whole number of steps [s], but for rounding."""
+    steps = 1.0 / (rate * step)
+    return round(steps) >= 1 and math.isclose(steps, round(steps), rel_tol=WHOLE)
+
+
+def winch_group_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What does not work with several cables on one winch."""
+    scenario, robot, groups = scope.whole, scope.robot, scope.robot.winch_groups()
     if not groups.are_shared():
         return
     motions, name = robot.motion_type().freedom, robot.name
     if groups.count < motions:
-        problems.add(
-            f"{path}: robot: found {name} with {groups.count} winches for {len(robot.cables)} "
-            f"cables; accepted for a visual servo: at least {motions}, one for each motion"
-        )
+        found = f"{name} with {groups.count} winches for {len(robot.cables)} cables"
+        yield "robot", found, f"at least {motions} for a visual servo, one for each motion"
     for key, why in (
         ("tension_management", "which takes up slack cable by cable"),
         ("stability", "whose criterion takes each cable to have a winch of its own"),
     ):
         if getattr(scenario, key) is not None:
-            problems.add(f"{path}: {key}: found a section, {why}; accepted for {name}: null")
+            yield key, f"a section, {why}", f"null for {name}"
     integrator = scenario.integration.integrator
     if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
-        problems.add(
-            f"{path}: integration.integrator: found {integrator} with motors that have several "
-            f"cables each; accepted for {name}: {' or '.join(explicit_integrators())}"
-        )
-    problems.raise_any()
+        found = f"{integrator} with motors that have several cables each"
+        accepted = f"{' or '.join(explicit_integrators())} for {name}"
+        yield "integration.integrator", found, accepted
 
 
-def check_pose_plan(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses what contradicts a planned way to the pose that the camera asks for."""
+def plan_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What contradicts a planned way to the pose that the camera asks for."""
+    scenario = scope.whole
     if scenario.pose_plan is None:
         return
-
-    def refuse(key: str, found: object, accepted: str) -> ScenarioError:
-        return ScenarioError(f"{path}: {key}: found {found} with pose_plan; accepted: {accepted}")
-
     for key in ("open_loop", "trajectory"):
         if getattr(scenario, key) is not None:
-            raise refuse(key, "a section", "null")
+            yield key, "a section with pose_plan", "null"
     if scenario.target.carrier != "world":
-        raise refuse("target.carrier", scenario.target.carrier, "world")
+        yield "target.carrier", f"{scenario.target.carrier} with pose_plan", "world"
     if scenario.target.kind == "circles":
-        raise refuse("target.kind", "circles, which do not tell a pose", "another kind")
+        found = "circles, which do not tell a pose, with pose_plan"
+        yield "target.kind", found, "another kind"
     if scenario.controller.free_rotation:
-        raise refuse("controller.free_rotation", "true", "false: all of the pose is controlled")
+        accepted = "false: all of the pose is controlled"
+        yield "controller.free_rotation", "true with pose_plan", accepted
 
 
 def wanted_limits(settings: TorqueControl, robot: Robot) -> tuple[float, float]:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.cables.models import CABLE_MODELS
-from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.wrench_observers import WrenchError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimator
@@ -24,24 +24,21 @@ from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 
 if TYPE_CHECKING:
-    from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+    pass
 
 
-def check_wrench_estimation(scenario: Scenario, robot: Robot, path: Path) -> None:
-    """Refuses robots of which cables and lengths do not tell all of a wrench."""
+def wrench_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Robots of which cables and lengths do not tell all of a wrench."""
+    scenario, robot = scope.whole, scope.robot
     if scenario.wrench_estimation is None:
         return
     if not robot.motion_type().is_free or len(robot.cables) < 6:
-        raise ScenarioError(
-            f"{path}: wrench_estimation: found a section for {robot.name}, {robot.motion} with "
-            f"{len(robot.cables)} cables; accepted: 3R3T with at least 6"
-        )
+        found = f"a section for {robot.name}, {robot.motion} with {len(robot.cables)} cables"
+        yield "wrench_estimation", found, "3R3T with at least 6"
     model = scenario.cables.model_of(robot)
     if CABLE_MODELS[model].sags:
-        raise ScenarioError(
-            f"{path}: wrench_estimation: found a section with cables.model {model}; accepted: "
-            "cables that do not sag, whose lengths and tensions tell the pose"
-        )
+        accepted = "cables that do not sag, whose lengths and tensions tell the pose"
+        yield "wrench_estimation", f"a section with cables.model {model}", accepted
 
 
 def reading_error(sensors: SensorSettings, robot: Robot, friction: float) -> WrenchError:

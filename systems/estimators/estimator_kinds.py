@@ -1,19 +1,18 @@
 """Scenario section `estimator`: how the controller knows the platform's pose.
 
 `ESTIMATORS` is the table of the estimators that a scenario can name; a new one is one entry of it.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import System
 
 from cdpr_drake.geometry.motion_type import FREE, LEVEL
-from cdpr_drake.schema.fields import optional_section, section, text, texts
+from cdpr_drake.schema.declarations import OneOf, filled, settings
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.estimators.basic_estimators import (
     ControlIntegration,
@@ -188,23 +187,26 @@ ESTIMATORS: dict[str, EstimatorKind] = {
 estimators 1 to 7, in its order."""
 
 
-@dataclass(kw_only=True)
+@settings
 class EstimatorSettings:
     """The estimator of the platform's pose."""
 
-    kind: str = text("Estimator.", "control_integration", choices=ESTIMATORS)
-    compare: list[str] = texts(
+    kind: Annotated[str, OneOf(ESTIMATORS), "Estimator."] = "control_integration"
+    compare: Annotated[
+        list[str],
+        OneOf(ESTIMATORS),
         "Estimators that run beside it and are logged; nothing uses what they say.",
-        choices=ESTIMATORS,
-    )
-    known_tag: KnownTagSettings | None = optional_section(
-        "A tag whose pose is known, at which the estimate begins anew from time to time."
-    )
-    platform_tag: PlatformTagSettings | None = optional_section(
-        "A tag on the platform and a second camera, in the world, that sees it; for kinds "
-        "eye_to_hand and sensor_fusion."
-    )
-    fusion: FusionSettings = section("Tuning of kind fusion.", FusionSettings, required=False)
-    sensor_fusion: SensorFusionSettings = section(
-        "Sources and tuning of kind sensor_fusion.", SensorFusionSettings, required=False
+    ] = filled(list)
+    known_tag: Annotated[
+        KnownTagSettings | None,
+        "A tag whose pose is known, at which the estimate begins anew from time to time.",
+    ] = None
+    platform_tag: Annotated[
+        PlatformTagSettings | None,
+        "A tag on the platform and a second camera, in the world, that sees it; for kinds"
+        " eye_to_hand and sensor_fusion.",
+    ] = None
+    fusion: Annotated[FusionSettings, "Tuning of kind fusion."] = filled(FusionSettings)
+    sensor_fusion: Annotated[SensorFusionSettings, "Sources and tuning of kind sensor_fusion."] = (
+        filled(SensorFusionSettings)
     )

@@ -1,12 +1,11 @@
 """Scenario section `adaptation`, and its block: exit and anchor points learnt while servoing.
 
 `recursive_calibration` does the learning; a criterion is asked before the servo gets a model.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import Value
@@ -14,7 +13,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.fields import number, switch, whole
+from cdpr_drake.schema.declarations import In, Switch, settings
 from cdpr_drake.systems.estimators.recursive_calibration import (
     CORNER_ROWS,
     Beforehand,
@@ -36,58 +35,64 @@ ADAPTATION_PARTS = (
 """Numbers of the output `adaptation`."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Adaptation:
     """Exit points, anchor points and lengths at the start, learnt while the servo runs."""
 
-    exit_points: float = number(
+    exit_points: Annotated[
+        float,
+        In("m", gt=0.0),
         "Standard deviation of a coordinate of an exit point, before anything is measured.",
-        "m", 0.01, above=0.0,
-    )  # fmt: skip
-    anchor_points: float = number("The same of an anchor point.", "m", 0.01, above=0.0)
-    camera_place: float = number(
+    ] = 0.01
+    anchor_points: Annotated[float, In("m", gt=0.0), "The same of an anchor point."] = 0.01
+    camera_place: Annotated[
+        float,
+        In("m", ge=0.0),
         "Standard deviation of a coordinate of the camera on the platform; 0: it is exact.",
-        "m", 0.0, at_least=0.0,
-    )  # fmt: skip
-    camera_turn_deg: float = number("The same of a turn of it.", "deg", 0.0, at_least=0.0)
-    start_place: float = number(
-        "Standard deviation of a coordinate of the pose where the target is first seen, as the "
-        "estimator starts from it.",
-        "m", 0.001, above=0.0,
-    )  # fmt: skip
-    start_turn_deg: float = number("The same of a turn of it.", "deg", 0.1, above=0.0)
-    length_noise: float = number(
-        "Standard deviation of a length that encoders count.", "m", 1e-4, above=0.0
-    )
-    pixel_noise: float = number(
-        "Standard deviation of a coordinate of a corner that is found.", "px", 0.2, above=0.0
-    )
-    slack_below: float = number("Cables that pull less tell no length.", "N", 0.2, at_least=0.0)
-    spacing: float = number(
-        "Way of the platform from one pose that counts to the next.", "m", 0.005, above=0.0
-    )
-    turn_deg: float = number("Or its turn.", "deg", 2.0, above=0.0)
-    window: int = whole(
-        "Poses that are linearised anew; those before them stay linearised as they were, which "
-        "makes standard deviations too small: best as many as a motion has.",
-        100, at_least=2, at_most=1000,
-    )  # fmt: skip
-    period: float = number(
-        "Time between models that are offered to the servo.", "s", 0.5, above=0.0
-    )
-    believe: bool = switch("Whether the servo gets them; else they are logged alone.", True)
-    margin: float = number(
-        "Least margin of the stability criterion of a model that is believed.", "-", 0.0
-    )
-    margin_loss: float = number(
+    ] = 0.0
+    camera_turn_deg: Annotated[float, In("deg", ge=0.0), "The same of a turn of it."] = 0.0
+    start_place: Annotated[
+        float,
+        In("m", gt=0.0),
+        "Standard deviation of a coordinate of the pose where the target is first seen, "
+        "as the estimator starts from it.",
+    ] = 0.001
+    start_turn_deg: Annotated[float, In("deg", gt=0.0), "The same of a turn of it."] = 0.1
+    length_noise: Annotated[
+        float, In("m", gt=0.0), "Standard deviation of a length that encoders count."
+    ] = 0.0001
+    pixel_noise: Annotated[
+        float, In("px", gt=0.0), "Standard deviation of a coordinate of a corner that is found."
+    ] = 0.2
+    slack_below: Annotated[float, In("N", ge=0.0), "Cables that pull less tell no length."] = 0.2
+    spacing: Annotated[
+        float, In("m", gt=0.0), "Way of the platform from one pose that counts to the next."
+    ] = 0.005
+    turn_deg: Annotated[float, In("deg", gt=0.0), "Or its turn."] = 2.0
+    window: Annotated[
+        int,
+        In(ge=2, le=1000),
+        "Poses that are linearised anew; those before them stay linearised as they were, "
+        "which makes standard deviations too small: best as many as a motion has.",
+    ] = 100
+    period: Annotated[
+        float, In("s", gt=0.0), "Time between models that are offered to the servo."
+    ] = 0.5
+    believe: Annotated[Switch, "Whether the servo gets them; else they are logged alone."] = True
+    margin: Annotated[
+        float, In("-"), "Least margin of the stability criterion of a model that is believed."
+    ] = 0.0
+    margin_loss: Annotated[
+        float,
+        In("-", ge=0.0),
         "By how much that margin may be less than the one of the model before.",
-        "-", 0.05, at_least=0.0,
-    )  # fmt: skip
-    samples: int = whole(
-        "Robots, as likely as what was measured leaves them, of each of which the criterion must "
-        "hold.",
-        16, at_least=1, at_most=10_000,
-    )  # fmt: skip
+    ] = 0.05
+    samples: Annotated[
+        int,
+        In(ge=1, le=10000),
+        "Robots, as likely as what was measured leaves them, of each of which the "
+        "criterion must hold.",
+    ] = 16
 
     def beforehand(self) -> Beforehand:
         """What is known beforehand."""

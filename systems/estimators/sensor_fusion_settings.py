@@ -1,107 +1,111 @@
-"""What the estimator of kind sensor_fusion reads, and how far it trusts what.
+"""What the estimator of kind sensor_fusion reads, and how far it trusts what."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from typing import Annotated
 
 from cdpr_drake.models.sensor_catalogue import depth_sensor_names
-from cdpr_drake.schema.fields import number, optional_section, switch, text
+from cdpr_drake.schema.declarations import In, OneOf, Switch, settings
 
 
-@dataclass(kw_only=True)
+@settings
 class ToldObject:
     """How well the pose of the target is known before anything is seen; standard deviations.
 
     What is told is target.pose, wrong by perturbations.told_object.
     """
 
-    position: float = number("Of its position.", "m", 0.01, above=0.0)
-    rotation_deg: float = number("Of its rotation.", "deg", 1.0, above=0.0)
+    position: Annotated[float, In("m", gt=0.0), "Of its position."] = 0.01
+    rotation_deg: Annotated[float, In("deg", gt=0.0), "Of its rotation."] = 1.0
 
 
-@dataclass(kw_only=True)
+@settings
 class CalibrationDoubt:
     """That a camera may be worse calibrated than told, and how far off it is then; standard
     deviations."""
 
-    probability: float = number("That it is worse than told.", "-", 0.05, above=0.0, at_most=1.0)
-    position: float = number("Of the camera's position then.", "m", 0.02, above=0.0)
-    rotation_deg: float = number("Of its rotation then.", "deg", 1.0, above=0.0)
+    probability: Annotated[float, In("-", gt=0.0, le=1.0), "That it is worse than told."] = 0.05
+    position: Annotated[float, In("m", gt=0.0), "Of the camera's position then."] = 0.02
+    rotation_deg: Annotated[float, In("deg", gt=0.0), "Of its rotation then."] = 1.0
 
 
-@dataclass(kw_only=True)
+@settings
 class SensorFusionSettings:
     """Sources of kind `sensor_fusion` and how far it trusts them; standard deviations."""
 
-    on_board: bool = switch("Whether it looks at the target by the servo's camera.", True)
-    external: bool = switch("Whether it looks at platform_tag by the camera in the world.", True)
-    lengths: bool = switch("Whether it reads encoders and tensions.", True)
-    imu: bool = switch("Whether it moves on by sensors.imu, and not by what was asked for.", False)
-    on_board_depth: str | None = text(
+    on_board: Annotated[Switch, "Whether it looks at the target by the servo's camera."] = True
+    external: Annotated[Switch, "Whether it looks at platform_tag by the camera in the world."] = (
+        True
+    )
+    lengths: Annotated[Switch, "Whether it reads encoders and tensions."] = True
+    imu: Annotated[Switch, "Whether it moves on by sensors.imu, and not by what was asked for."] = (
+        False
+    )
+    on_board_depth: Annotated[
+        str | None,
+        OneOf(depth_sensor_names()),
         "Type of a depth camera beside the servo's camera; null: none.",
-        None,
-        choices=depth_sensor_names(),
-    )
-    external_depth: str | None = text(
+    ] = None
+    external_depth: Annotated[
+        str | None,
+        OneOf(depth_sensor_names()),
         "Type of a depth camera beside that in the world; null: none.",
-        None,
-        choices=depth_sensor_names(),
-    )
-    steer: bool = switch(
-        "Whether the servo sees the target where the fused poses put it, so that it goes on while "
-        "its camera does not see it; else by the image.",
-        True,
-    )
-    told_object: ToldObject | None = optional_section(
-        "What is known of the target's pose beforehand; null: the first image tells."
-    )
-    start_position: float = number("Of the position at the start.", "m", 0.005, at_least=0.0)
-    start_rotation_deg: float = number("Of the rotation at the start.", "deg", 0.5, at_least=0.0)
-    velocity: float = number(
-        "Of the motion from what was asked for, per root of time.", "m/sqrt(s)", 3e-3, above=0.0
-    )
-    angular_velocity_deg: float = number("The same of the rotation.", "deg/sqrt(s)", 0.5, above=0.0)
-    on_board_position: float = number(
-        "Of the servo's camera on the platform.", "m", 0.003, at_least=0.0
-    )
-    on_board_rotation_deg: float = number("Of its rotation.", "deg", 0.3, at_least=0.0)
-    external_position: float = number("Of the camera in the world.", "m", 0.003, at_least=0.0)
-    external_rotation_deg: float = number("Of its rotation.", "deg", 0.2, at_least=0.0)
-    on_board_doubt: CalibrationDoubt | None = optional_section(
-        "What if the servo's camera is further off than these two say; null: it is not."
-    )
-    external_doubt: CalibrationDoubt | None = optional_section(
-        "What if the camera in the world is further off than its two say; null: it is not."
-    )
-    pixel: float = number("Of a coordinate of a point in either image.", "px", 0.3, above=0.0)
-    depth_share: float = number(
-        "Of a depth, over what its type says; 1: as it says.", "-", 1.0, above=0.0
-    )
-    length: float = number("Of a counted length.", "m", 5e-4, above=0.0)
-    length_offset: float = number(
-        "Of what is wrong with a counted length from the start.", "m", 1e-3, at_least=0.0
-    )
-    length_drift: float = number(
-        "Of what errors of the model add to it per root of time.", "m/sqrt(s)", 5e-4, at_least=0.0
-    )
-    taut: float = number("Tension below which a cable counts as slack.", "N", 0.5, at_least=0.0)
-    asked_velocity: float = number(
-        "Of the velocity from what was asked for, with imu.", "m/s", 0.03, above=0.0
-    )
-    gate: float = number(
-        "Probability with which a right reading is rejected.", "-", 1e-3, at_least=0.0, at_most=0.5
-    )
-    patience: float = number(
+    ] = None
+    steer: Annotated[
+        Switch,
+        "Whether the servo sees the target where the fused poses put it, so that it goes "
+        "on while its camera does not see it; else by the image.",
+    ] = True
+    told_object: Annotated[
+        ToldObject | None,
+        "What is known of the target's pose beforehand; null: the first image tells.",
+    ] = None
+    start_position: Annotated[float, In("m", ge=0.0), "Of the position at the start."] = 0.005
+    start_rotation_deg: Annotated[float, In("deg", ge=0.0), "Of the rotation at the start."] = 0.5
+    velocity: Annotated[
+        float, In("m/sqrt(s)", gt=0.0), "Of the motion from what was asked for, per root of time."
+    ] = 0.003
+    angular_velocity_deg: Annotated[
+        float, In("deg/sqrt(s)", gt=0.0), "The same of the rotation."
+    ] = 0.5
+    on_board_position: Annotated[
+        float, In("m", ge=0.0), "Of the servo's camera on the platform."
+    ] = 0.003
+    on_board_rotation_deg: Annotated[float, In("deg", ge=0.0), "Of its rotation."] = 0.3
+    external_position: Annotated[float, In("m", ge=0.0), "Of the camera in the world."] = 0.003
+    external_rotation_deg: Annotated[float, In("deg", ge=0.0), "Of its rotation."] = 0.2
+    on_board_doubt: Annotated[
+        CalibrationDoubt | None,
+        "What if the servo's camera is further off than these two say; null: it is not.",
+    ] = None
+    external_doubt: Annotated[
+        CalibrationDoubt | None,
+        "What if the camera in the world is further off than its two say; null: it is not.",
+    ] = None
+    pixel: Annotated[float, In("px", gt=0.0), "Of a coordinate of a point in either image."] = 0.3
+    depth_share: Annotated[
+        float, In("-", gt=0.0), "Of a depth, over what its type says; 1: as it says."
+    ] = 1.0
+    length: Annotated[float, In("m", gt=0.0), "Of a counted length."] = 0.0005
+    length_offset: Annotated[
+        float, In("m", ge=0.0), "Of what is wrong with a counted length from the start."
+    ] = 0.001
+    length_drift: Annotated[
+        float, In("m/sqrt(s)", ge=0.0), "Of what errors of the model add to it per root of time."
+    ] = 0.0005
+    taut: Annotated[float, In("N", ge=0.0), "Tension below which a cable counts as slack."] = 0.5
+    asked_velocity: Annotated[
+        float, In("m/s", gt=0.0), "Of the velocity from what was asked for, with imu."
+    ] = 0.03
+    gate: Annotated[
+        float, In("-", ge=0.0, le=0.5), "Probability with which a right reading is rejected."
+    ] = 0.001
+    patience: Annotated[
+        float,
+        In("s", gt=0.0),
         "Time after which a source that was always rejected is believed to be out of calibration.",
-        "s",
-        1.0,
-        above=0.0,
-    )
-    lost_position: float = number(
+    ] = 1.0
+    lost_position: Annotated[
+        float,
+        In("m", gt=0.0),
         "Of a camera's position once it is believed to be out of calibration, and of a length.",
-        "m",
-        0.05,
-        above=0.0,
-    )
-    lost_rotation_deg: float = number("Of its rotation then.", "deg", 3.0, above=0.0)
+    ] = 0.05
+    lost_rotation_deg: Annotated[float, In("deg", gt=0.0), "Of its rotation then."] = 3.0

@@ -3,11 +3,9 @@
 Lengths, stretched by tensions, tell the pose (forward kinematics from the pose before), and that
 and tensions the wrench, by one of `estimation.wrench_observers.OBSERVERS`, which says what each is
 worth.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -28,7 +26,7 @@ from cdpr_drake.estimation.wrench_observers import (
 )
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.fields import FASTEST, number, text
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
@@ -43,43 +41,40 @@ MISFIT = 0.02
 """Lengths that fit a pose this badly [m] tell none: the pose before stays."""
 
 
-@dataclass(kw_only=True)
+@settings
 class WrenchEstimation:
     """An estimate of what pushes the platform beside its cables and its weight."""
 
-    kind: str = text(
-        "static: what balances cables and weight, which takes acceleration for a wrench; momentum: "
-        "from the change of momentum; extended: a state of an observer of the motion.",
-        MOMENTUM,
-        choices=tuple(OBSERVERS),
-    )
-    rate: float = number("Samples per second.", "Hz", 200.0, above=0.0, at_most=FASTEST)
-    bandwidth: float = number(
+    kind: Annotated[
+        str,
+        OneOf(OBSERVERS),
+        "static: what balances cables and weight, which takes acceleration for a wrench; "
+        "momentum: from the change of momentum; extended: a state of an observer of the "
+        "motion.",
+    ] = MOMENTUM
+    rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Samples per second."] = 200.0
+    bandwidth: Annotated[
+        float,
+        In("Hz", gt=0.0),
         "Of the estimate, over 2 pi: it is late by a time constant, by three of kind extended.",
-        "Hz",
-        2.0,
-        above=0.0,
-    )
-    slack_below: float = number(
+    ] = 2.0
+    slack_below: Annotated[
+        float,
+        In("N", ge=0.0),
         "Cables that pull less tell nothing of the pose, while there are enough others.",
-        "N",
-        0.5,
-        at_least=0.0,
-    )
-    pulley_friction: float = number(
-        "Share of a tension that pulleys take between the sensors and the platform; 0: sensors are "
-        "at the platform.",
-        "-",
-        0.0,
-        at_least=0.0,
-        at_most=0.5,
-    )
-    believed_pulley_friction: float | None = number(
-        "The share that is reckoned with; null: what it is.", "-", None, at_least=0.0, at_most=0.5
-    )
-    fading_speed: float = number(
-        "Cable speed below which that friction fades.", "m/s", 0.001, above=0.0
-    )
+    ] = 0.5
+    pulley_friction: Annotated[
+        float,
+        In("-", ge=0.0, le=0.5),
+        "Share of a tension that pulleys take between the sensors and the platform; 0: "
+        "sensors are at the platform.",
+    ] = 0.0
+    believed_pulley_friction: Annotated[
+        float | None, In("-", ge=0.0, le=0.5), "The share that is reckoned with; null: what it is."
+    ] = None
+    fading_speed: Annotated[
+        float, In("m/s", gt=0.0), "Cable speed below which that friction fades."
+    ] = 0.001
 
     def believed_share(self) -> float:
         """Share of a tension that pulleys are believed to take."""

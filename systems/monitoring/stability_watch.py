@@ -2,12 +2,11 @@
 
 `ServoCriterion` is the criterion at moments of a servo, `StabilityWatch` the block that gives it as
 signals of the log, and `StabilitySettings` the scenario section `stability` that asks for it.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import Value
@@ -19,7 +18,7 @@ from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.straight_cables import PLANAR_ROWS
-from cdpr_drake.schema.fields import number
+from cdpr_drake.schema.declarations import In, settings
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.servoing.visual_features import VisualFeatures
 from cdpr_drake.stability.criterion import ModelAtPose, stability_margin, stability_matrix
@@ -165,13 +164,12 @@ class StabilityWatch(LeafSystem):
         return np.array([count, float(rank), margin])
 
 
-@dataclass(kw_only=True)
+@settings
 class StabilitySettings:
     """Logs how many cables pull, the rank of their Jacobian, and the criterion's margin."""
 
-    threshold: float | None = number(
+    threshold: Annotated[
+        float | None,
+        In("N", ge=0.0),
         "Tension from which a cable counts as taut; null: one that is not slack.",
-        "N",
-        None,
-        at_least=0.0,
-    )
+    ] = None

@@ -1,71 +1,50 @@
-"""Scenario section `remote`: a process outside closes the loop.
+"""Scenario section `remote`: a process outside closes the loop."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+from collections.abc import Collection, Iterator
+from typing import Annotated
 
-from collections.abc import Collection
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
-
-from cdpr_drake.errors import ScenarioError, accepted_names
-from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, text
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, settings
 from cdpr_drake.systems.remote.remote_driver import SyncMode
 from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, TWIST
 
 PLACES = (*TENSION_PLACES, *SERVO_PLACES)
 
 
-@dataclass(kw_only=True)
+@settings
 class RemoteSettings:
     """Where a process outside stands, and how the run waits for it; see cdpr serve."""
 
-    place: str = text(
-        "Which block it replaces: distributor, controller or trajectory of dynamic control, or "
-        "servo (cable velocities) or twist (of the platform) of a visual servo.",
-        choices=PLACES,
-    )
-    pace: str = text(
+    place: Annotated[
+        str,
+        OneOf(PLACES),
+        "Which block it replaces: distributor, controller or trajectory of dynamic "
+        "control, or servo (cable velocities) or twist (of the platform) of a visual "
+        "servo.",
+    ]
+    pace: Annotated[
+        str,
+        OneOf(tuple(pace.value for pace in SyncMode)),
         "Whether the run waits for each command, or goes on in real time with the last one.",
-        SyncMode.LOCK_STEP.value,
-        choices=tuple(pace.value for pace in SyncMode),
-    )
-    timeout: float = number(
-        "Silence of the process after which the run ends.", "s", 10.0, above=0.0, at_most=86400.0
-    )
+    ] = SyncMode.LOCK_STEP.value
+    timeout: Annotated[
+        float, In("s", gt=0.0, le=86400.0), "Silence of the process after which the run ends."
+    ] = 10.0
 
 
-def check_place(settings: RemoteSettings | None, accepted: Collection[str], path: Path) -> None:
-    """Refuses a place that a scenario does not have.
-
-    Args:
-        settings: The section; None: nobody stands anywhere.
-        accepted: Places that there are.
-        path: The scenario's file, for the message.
-
-    Raises:
-        ScenarioError: It is none of them.
-    """
-    if settings is not None and settings.place not in accepted:
-        known = accepted_names(settings.place, accepted)
-        raise ScenarioError(f"{path}: remote.place: found {settings.place}; {known}")
+def place_refusals(settings: RemoteSettings | None, places: Collection[str]) -> Iterator[Refusal]:
+    """A place that a scenario does not have."""
+    if settings is not None and settings.place not in places:
+        yield "remote.place", settings.place, f"one of {', '.join(places)}"
 
 
-def check_servo_place(scenario: Any, robot: Robot, path: Path) -> None:
-    """Refuses a place that a visual servo does not have, or what contradicts it.
-
-    Raises:
-        ScenarioError: See above.
-    """
-    check_place(scenario.remote, SERVO_PLACES, path)
-    if scenario.remote is None:
+def servo_place_refusals(scope: Scope) -> Iterator[Refusal]:
+    """A place that a visual servo does not have, or what contradicts it."""
+    scenario, remote = scope.whole, scope.whole.remote
+    yield from place_refusals(remote, SERVO_PLACES)
+    if remote is None:
         return
     for key in ("open_loop", "pose_plan"):
         if getattr(scenario, key) is not None:
-            raise ScenarioError(f"{path}: {key}: found a section with remote; accepted: null")
-    if scenario.winches.mode == "torque" and scenario.remote.place != TWIST:
-        raise ScenarioError(
-            f"{path}: remote.place: found {scenario.remote.place} with winches.mode torque; "
-            f"accepted: {TWIST}"
-        )
+            yield key, "a section with remote", "null"
+    if scenario.winches.mode == "torque" and remote.place != TWIST:
+        yield "remote.place", f"{remote.place} with winches.mode torque", TWIST

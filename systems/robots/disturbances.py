@@ -15,12 +15,10 @@ the wrench about Po is (m + p_PoQ x f, f).
   left out.
 
 Source of the spectrum: MIL-F-8785C, Flying qualities of piloted airplanes, 1980, 3.7.1.2.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
 from pydrake.common.value import Value
@@ -30,7 +28,8 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.sensor_noise import sample_noise
-from cdpr_drake.schema.fields import array, number, sections, text
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, settings, values
+from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 
 STEP, PUSH, SINE, WIND, PAYLOAD = "step", "push", "sine", "wind", "payload"
@@ -59,65 +58,53 @@ STREAM = 4200
 """Stream of the wind's random numbers, apart from those of sensors; one more for each wind."""
 
 
-@dataclass(kw_only=True)
+@settings
 class Push:
     """One thing that pushes the platform."""
 
-    kind: str = text("What it is like over time.", choices=tuple(NEEDED))
-    start: float = number("When it begins.", "s", 0.0, at_least=0.0)
-    end: float | None = number("When it ends; null: with the run.", "s", None, above=0.0)
-    force: np.ndarray | None = array("Force.", "N", (3,), None)
-    moment: np.ndarray | None = array("Moment about Po.", "N m", (3,), None)
-    frame: str = text(
+    kind: Annotated[str, OneOf(NEEDED), "What it is like over time."]
+    start: Annotated[float, In("s", ge=0.0), "When it begins."] = 0.0
+    end: Annotated[float | None, In("s", gt=0.0), "When it ends; null: with the run."] = None
+    force: Annotated[np.ndarray | None, In("N", 3), "Force."] = None
+    moment: Annotated[np.ndarray | None, In("N m", 3), "Moment about Po."] = None
+    frame: Annotated[
+        str,
+        OneOf((WORLD, PLATFORM)),
         "Axes of force and moment: those of W, or of P, which turn with the platform.",
-        WORLD,
-        choices=(WORLD, PLATFORM),
-    )
-    point: np.ndarray = array("Where the force acts, in P.", "m", (3,), (0.0, 0.0, 0.0))
-    frequency: float | None = number("Of a sine.", "Hz", None, above=0.0)
-    wind: np.ndarray | None = array("Mean wind in W.", "m/s", (3,), None)
-    drag_area: float | None = number(
-        "Drag coefficient times area that the wind meets.", "m^2", None, above=0.0
-    )
-    intensity: float | None = number(
+    ] = WORLD
+    point: Annotated[np.ndarray, In("m", 3), "Where the force acts, in P."] = values(0.0, 0.0, 0.0)
+    frequency: Annotated[float | None, In("Hz", gt=0.0), "Of a sine."] = None
+    wind: Annotated[np.ndarray | None, In("m/s", 3), "Mean wind in W."] = None
+    drag_area: Annotated[
+        float | None, In("m^2", gt=0.0), "Drag coefficient times area that the wind meets."
+    ] = None
+    intensity: Annotated[
+        float | None,
+        In("-", gt=0.0, le=1.0),
         "Of the wind's turbulence: standard deviation over mean speed; null: none.",
-        "-",
-        None,
-        above=0.0,
-        at_most=1.0,
-    )
-    length_scale: float | None = number("Of the turbulence; null: 10 m.", "m", None, above=0.0)
-    mass: float | None = number("Of a payload; below zero: it is lost.", "kg", None)
+    ] = None
+    length_scale: Annotated[float | None, In("m", gt=0.0), "Of the turbulence; null: 10 m."] = None
+    mass: Annotated[float | None, In("kg"), "Of a payload; below zero: it is lost."] = None
 
-    def check(self, where: str) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            ScenarioError: Something is missing, or belongs to another kind; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What is missing, or belongs to another kind."""
         for name in NEEDED[self.kind]:
             if getattr(self, name) is None:
-                raise ScenarioError(f"{where}.{name}: found none; accepted with {self.kind}: one")
+                yield name, "none", f"one, with {self.kind}"
         for name, kind in OWN.items():
             if kind != self.kind and getattr(self, name) is not None:
-                raise ScenarioError(
-                    f"{where}.{name}: found one with {self.kind}; accepted with {kind} alone"
-                )
+                yield name, f"one with {self.kind}", f"none, but with {kind}"
         given = self.force is not None or self.moment is not None
         if given != (self.kind in (STEP, PUSH, SINE)):
             accepted = "none" if given else "a force, a moment, or both"
-            raise ScenarioError(
-                f"{where}.force: found {'one' if given else 'no force and no moment'}; accepted "
-                f"with {self.kind}: {accepted}"
-            )
+            found = "one" if given else "no force and no moment"
+            yield "force", found, f"{accepted}, with {self.kind}"
         if self.end is not None and self.end <= self.start:
-            raise ScenarioError(
-                f"{where}.end: found {self.end:g} s; accepted: above the start, {self.start:g} s"
-            )
-        if self.kind == WIND and not np.any(self.wind):
-            raise ScenarioError(f"{where}.wind: found none; accepted: a mean speed above 0 [m/s]")
+            yield "end", f"{self.end:g} s", f"above the start, {self.start:g} s"
+        if self.kind == WIND and self.wind is not None and not np.any(self.wind):
+            yield "wind", "none", "a mean speed above 0 [m/s]"
         if self.kind == PAYLOAD and self.mass == 0.0:
-            raise ScenarioError(f"{where}.mass: found 0; accepted: above or below 0 [kg]")
+            yield "mass", "0", "above or below 0 [kg]"
 
     def share(self, time: float) -> float:
         """What of force and moment acts at a time [s]."""
@@ -168,42 +155,21 @@ class Push:
         return float(np.exp(-period * speed / length)), self.intensity * speed
 
 
-@dataclass(kw_only=True)
+@settings
 class DisturbanceSettings:
     """What pushes the platform, and how often that changes."""
 
-    pushes: list[Push] = sections("What pushes the platform; all of it adds up.")
-    rate: float = number(
+    pushes: Annotated[list[Push], "What pushes the platform; all of it adds up."]
+    rate: Annotated[
+        float,
+        In("Hz", gt=0.0, le=100000.0),
         "How often the wrench changes; between, it is that of the middle of the period.",
-        "Hz",
-        1000.0,
-        above=0.0,
-        at_most=1e5,
-    )
+    ] = 1000.0
 
-    def check(self) -> None:
-        """Checks every push.
-
-        Raises:
-            ScenarioError: There is none, or one is not accepted; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """No push at all."""
         if not self.pushes:
-            raise ScenarioError("disturbances.pushes: found none; accepted: at least one")
-        for number_, push in enumerate(self.pushes):
-            push.check(f"disturbances.pushes[{number_}]")
-
-
-def check_disturbances(settings: DisturbanceSettings | None, path: Path) -> None:
-    """Checks the section of a scenario's file.
-
-    Raises:
-        ScenarioError: Something is not accepted; names the file and it.
-    """
-    try:
-        if settings is not None:
-            settings.check()
-    except ScenarioError as problem:
-        raise ScenarioError(f"{path}: {problem}") from problem
+            yield "pushes", "none", "at least one"
 
 
 class Disturbances(LeafSystem):
@@ -224,7 +190,7 @@ class Disturbances(LeafSystem):
     def __init__(self, settings: DisturbanceSettings, gravity: Array, *, seed: int = 0) -> None:
         """With settings that are checked, gravity in W, shape (3,) [m/s^2], and a seed."""
         super().__init__()
-        settings.check()
+        refuse(settings, "disturbances", error=ScenarioError)
         self._settings, self._gravity, self._seed = settings, np.asarray(gravity, float), seed
         self._period = 1.0 / settings.rate
         self._turbulence = [push.turbulence(self._period) for push in settings.pushes]
@@ -249,7 +215,7 @@ class Disturbances(LeafSystem):
         """
         if push.kind == WIND:
             raise ScenarioError("push: found wind; accepted: a kind without gusts")
-        push.check("push")
+        refuse(push, "push", error=ScenarioError)
         self._settings.pushes.append(push)
         self._turbulence.append((0.0, 0.0))
 

@@ -12,13 +12,11 @@ Every failure begins at a time and lasts. See `FAILURES` for what there is:
   the first of that comes, it gives what it read last.
 
 A camera that goes dark is `camera.fault` of a scenario.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.systems.framework import (
@@ -30,9 +28,8 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import Problems, ScenarioError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, sections, text, whole
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, Text, filled, settings
 
 BROKEN, JAMMED, POWERLESS = FAULTS = ("broken", "jammed", "powerless")
 """Inputs and outputs of a robot block with `failures`: 1 for each cable that is broken, for each
@@ -79,6 +76,13 @@ class Equipment:
     sensors: tuple[str, ...] = ()
     per_cable: tuple[str, ...] = ("tension", "encoder")
 
+    @classmethod
+    def of(cls, scenario: Any, robot: Robot) -> "Equipment":
+        """That of a scenario's robot."""
+        sensors = scenario.sensors.sampled() if hasattr(scenario, "sensors") else ()
+        count = robot.winch_groups().count
+        return cls(len(robot.cables), count, scenario.winches.has_motors(), tuple(sensors))
+
     def knows(self, name: str, found: int | str | float) -> bool:
         """Whether there is what a field of a failure says."""
         if name == "sensor":
@@ -95,57 +99,44 @@ class Equipment:
         return self.cables if name == "cable" else self.winches
 
 
-@dataclass(kw_only=True)
+@settings
 class Failure:
     """One thing that fails."""
 
-    kind: str = text("What fails.", choices=tuple(FAILURES))
-    time: float = number("When.", "s", at_least=0.0)
-    cable: int | None = whole("Number of the cable that breaks, from 0.", None, at_least=0)
-    winch: int | None = whole(
-        "Number of the winch that fails, from 0; each cable has its own, but where the robot's "
-        "file puts several on one.",
-        None,
-        at_least=0,
-    )
-    delay: float | None = number(
+    kind: Annotated[str, OneOf(FAILURES), "What fails."]
+    time: Annotated[float, In("s", ge=0.0), "When."]
+    cable: Annotated[int | None, In(ge=0), "Number of the cable that breaks, from 0."] = None
+    winch: Annotated[
+        int | None,
+        In(ge=0),
+        "Number of the winch that fails, from 0; each cable has its own, but where the "
+        "robot's file puts several on one.",
+    ] = None
+    delay: Annotated[
+        float | None,
+        In("s", ge=0.0),
         "From the time until a brake has closed, null: at once; of messages that are late.",
-        "s",
-        None,
-        at_least=0.0,
-    )
-    sensor: str | None = text("Which sensor freezes or is late, as section sensors names it.", None)
+    ] = None
+    sensor: Annotated[
+        Text | None, "Which sensor freezes or is late, as section sensors names it."
+    ] = None
 
-    def check(self, where: str, has: Equipment) -> None:
-        """Checks what belongs together.
-
-        Raises:
-            ScenarioError: Something is missing, belongs to another kind, or there is no such cable,
-                winch or sensor; names it.
-        """
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What is missing, belongs to another kind, or is not there."""
+        has = Equipment.of(scope.whole, scope.robot)
         for name in ("cable", "winch", "sensor", "delay"):
             found, mine = getattr(self, name), name in NEEDS[self.kind]
             if found is None and mine:
-                raise ScenarioError(
-                    f"{where}.{name}: found none with {self.kind}; accepted: {has.accepted(name)}"
-                )
-            if found is not None and not mine and name not in OPTIONAL.get(self.kind, ()):
-                raise ScenarioError(
-                    f"{where}.{name}: found {found} with {self.kind}; accepted: null"
-                )
-            if found is not None and not has.knows(name, found):
-                raise ScenarioError(
-                    f"{where}.{name}: found {found}; accepted: {has.accepted(name)}"
-                )
+                yield name, f"none with {self.kind}", has.accepted(name)
+            elif found is not None and not mine and name not in OPTIONAL.get(self.kind, ()):
+                yield name, f"{found} with {self.kind}", "null"
+            elif found is not None and not has.knows(name, found):
+                yield name, found, has.accepted(name)
         if self.kind == POWER and not has.motors:
-            raise ScenarioError(
-                f"{where}.kind: found {self.kind} with ideal winches, which have no motors; "
-                f"accepted: {BREAKS}, {JAMS}, {BRAKE}, or winches.kind motor"
-            )
+            found = f"{self.kind} with ideal winches, which have no motors"
+            yield "kind", found, f"{BREAKS}, {JAMS}, {BRAKE}, or winches.kind motor"
         if self.cable is not None and self.sensor not in (None, *has.per_cable):
-            raise ScenarioError(
-                f"{where}.cable: found {self.cable} with {self.sensor}; accepted: null"
-            )
+            yield "cable", f"{self.cable} with {self.sensor}", "null"
 
     def words(self, robot: Robot) -> str:
         """What fails, in words: the cable, or the winch by the cables on it."""
@@ -173,23 +164,11 @@ class Failure:
         return self.time + (self.delay or 0.0 if self.kind == BRAKE else 0.0)
 
 
-@dataclass(kw_only=True)
+@settings
 class FailureSettings:
     """What fails at a robot."""
 
-    events: list[Failure] = sections("What fails, and when.", required=False)
-
-    def check(self, has: Equipment) -> None:
-        """Checks every failure of a scenario.
-
-        Raises:
-            ScenarioError: One is not accepted; names it.
-        """
-        problems = Problems(ScenarioError)
-        for k, event in enumerate(self.events):
-            with problems.collected():
-                event.check(f"failures.events[{k}]", has)
-        problems.raise_any()
+    events: Annotated[list[Failure], "What fails, and when."] = filled(list)
 
     def flags(self, time: float, cables: int, winches: int) -> dict[str, Array]:
         """What has failed by a time [s], by the names of `FAULTS`."""
@@ -203,31 +182,6 @@ class FailureSettings:
     def of_sensors(self) -> Iterator[Failure]:
         """Those of sensors."""
         return (event for event in self.events if event.kind in OF_SENSORS)
-
-
-def check_failures(
-    settings: FailureSettings | None, robot: Robot, motors: bool, sensors: Sequence[str], path: Path
-) -> None:
-    """Checks the section of a scenario's file.
-
-    Args:
-        settings: The section.
-        robot: The robot.
-        motors: Whether its winches have motors.
-        sensors: Those that sample and are logged.
-        path: The file.
-
-    Raises:
-        ScenarioError: Something is not accepted; names the file and it.
-    """
-    problems = Problems(ScenarioError)
-    try:
-        if settings is not None:
-            winches = robot.winch_groups().count
-            settings.check(Equipment(len(robot.cables), winches, motors, tuple(sensors)))
-    except ScenarioError as problem:
-        problems.add(*(f"{path}: {line}" for line in problem.problems))
-    problems.raise_any()
 
 
 class Failures(LeafSystem):

@@ -1,10 +1,7 @@
-"""How a robot is simulated: its cables, winches and damping, sections of a scenario.
+"""How a robot is simulated: its cables, winches and damping, sections of a scenario."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.systems.primitives import MatrixGain
@@ -14,13 +11,13 @@ from cdpr_drake.cables.models import CABLE_MODELS, KELVIN_VOIGT
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import number, optional_section, section, switch, text
+from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings
 from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.failures import Failures, FailureSettings
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
 
-@dataclass(kw_only=True)
+@settings
 class CableSettings:
     """Which cables a simulated robot has; their values stand in the robot's file.
 
@@ -28,28 +25,27 @@ class CableSettings:
     tensions are not determined. Stiff Kelvin-Voigt cables are what comes nearest.
     """
 
-    model: str | None = text(
+    model: Annotated[
+        str | None,
+        OneOf(tuple(name for name, model in CABLE_MODELS.items() if model.extensible)),
         "How a cable answers to its length. Default: the robot file's `cable_model`, or "
         f"{KELVIN_VOIGT} where it gives none.",
-        None,
-        choices=tuple(name for name, model in CABLE_MODELS.items() if model.extensible),
-    )
-    pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
+    ] = None
+    pulleys: Annotated[Switch, "Whether the cables run over the robot's pulleys."] = False
 
-    stiffness_ratio: float = number(
-        "Stiffness of the simulated cables per that of the robot's file. Ropes, what holds pulleys "
-        "and sensors, and the platform give more than the modulus of a fibre says.",
-        "-",
-        1.0,
-        above=0.0,
-    )
+    stiffness_ratio: Annotated[
+        float,
+        In("-", gt=0.0),
+        "Stiffness of the simulated cables per that of the robot's file. Ropes, what "
+        "holds pulleys and sensors, and the platform give more than the modulus of a "
+        "fibre says.",
+    ] = 1.0
 
-    retardation_time: float | None = number(
+    retardation_time: Annotated[
+        float | None,
+        In("s", ge=0.0),
         "Viscous damping of the simulated cables, over their stiffness; null: the robot file's.",
-        "s",
-        None,
-        at_least=0.0,
-    )
+    ] = None
 
     def model_of(self, robot: Robot | None = None) -> str:
         """Name of the simulated cables' model: these settings', or that of the robot's file.
@@ -95,28 +91,28 @@ ENGINES = (AUTOMATIC, PLANT, COMPILED)
 IDEAL, MOTOR = "ideal", "motor"
 
 
-@dataclass(kw_only=True)
+@settings
 class WinchSettings:
     """Which winches a simulated robot has; their values stand in the robot's file."""
 
-    kind: str = text(
+    kind: Annotated[
+        str,
+        OneOf((IDEAL, MOTOR)),
         "ideal follows commanded velocities at once; motor has inertia, friction and limits.",
-        IDEAL,
-        choices=(IDEAL, MOTOR),
-    )
-    mode: str = text(
-        "What the winches are commanded; ideal ones take velocity only. By position, a visual "
-        "servo's velocities are integrated from the lengths at the start.",
-        "velocity",
-        choices=tuple(COMMAND_PORTS),
-    )
+    ] = IDEAL
+    mode: Annotated[
+        str,
+        OneOf(COMMAND_PORTS),
+        "What the winches are commanded; ideal ones take velocity only. By position, a "
+        "visual servo's velocities are integrated from the lengths at the start.",
+    ] = "velocity"
 
     def has_motors(self) -> bool:
         """Whether the winches have motors."""
         return self.kind == MOTOR
 
 
-@dataclass(kw_only=True)
+@settings
 class DampingSettings:
     """Viscous damping of the platform's motion about Po: air, and friction at pulleys and joints.
 
@@ -124,12 +120,14 @@ class DampingSettings:
     the cables damps that. What is not given here, the robot's file says.
     """
 
-    translation: float | None = number(
-        "Force per velocity of Po. Default: the robot file's.", "N s/m", None, at_least=0.0
-    )
-    rotation: float | None = number(
-        "Moment per angular velocity. Default: the robot file's.", "N m s/rad", None, at_least=0.0
-    )
+    translation: Annotated[
+        float | None, In("N s/m", ge=0.0), "Force per velocity of Po. Default: the robot file's."
+    ] = None
+    rotation: Annotated[
+        float | None,
+        In("N m s/rad", ge=0.0),
+        "Moment per angular velocity. Default: the robot file's.",
+    ] = None
 
     def of(self, robot: Robot) -> tuple[float, float]:
         """Damping of a robot's simulated platform [N s/m, N m s/rad]."""
@@ -206,21 +204,21 @@ def _plain(value: Any) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-@dataclass(kw_only=True)
+@settings
 class CableRobotSettings:
     """How a robot is simulated beside what its file says."""
 
-    cables: CableSettings = section("The simulated cables.", CableSettings, required=False)
-    winches: WinchSettings = section("The winches.", WinchSettings, required=False)
-    damping: DampingSettings = section(
-        "Additional damping of the platform.", DampingSettings, required=False
+    cables: Annotated[CableSettings, "The simulated cables."] = filled(CableSettings)
+    winches: Annotated[WinchSettings, "The winches."] = filled(WinchSettings)
+    damping: Annotated[DampingSettings, "Additional damping of the platform."] = filled(
+        DampingSettings
     )
-    disturbances: DisturbanceSettings | None = optional_section(
-        "What pushes the platform beside its cables; null: nothing."
-    )
-    failures: FailureSettings | None = optional_section(
-        "What fails: cables that break, winches; null: nothing."
-    )
+    disturbances: Annotated[
+        DisturbanceSettings | None, "What pushes the platform beside its cables; null: nothing."
+    ] = None
+    failures: Annotated[
+        FailureSettings | None, "What fails: cables that break, winches; null: nothing."
+    ] = None
 
     def disturbance_block(self, robot: Robot) -> Disturbances | None:
         """The block of `disturbances`, by the seed of the scenario that these settings are, or 0;

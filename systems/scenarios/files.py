@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
 import yaml
 
@@ -16,13 +16,11 @@ from cdpr_drake.models.exit_points import MARK as RAILS_MARK
 from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
-from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
-from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.schema.input_files import input_text, input_there
-from cdpr_drake.schema.typed_yaml import closest, load_typed
+from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.schema.yaml_files import compose_yaml, too_many_bytes
-from cdpr_drake.systems.worlds.settings import WorldSettings
 
 _FOLDER = Path(__file__).parent
 
@@ -146,7 +144,7 @@ def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
     return None
 
 
-def _unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
+def unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
     """What is wrong with the robot's name in a file that has other problems; often nothing."""
     value = _scalar(path, "robot")
     if value is None or any(item.partition("=")[0].strip() == "robot" for item in overrides):
@@ -182,36 +180,12 @@ def _resolve(scenario_path: Path, robot: str) -> str:
     return str((beside if here else Path(robot)).absolute())
 
 
-class _OfRobot(Protocol):
-    robot: str
-    world: WorldSettings | None
-
-
-class _OfMechanism(Protocol):
-    mechanism: str
-
-
-S = TypeVar("S", bound=_OfRobot)
-M = TypeVar("M", bound=_OfMechanism)
-
-
-def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tuple[S, Robot, Path]:
-    """A scenario by name or by path, its robot, and its file; not yet checked against the robot.
-
-    Args:
-        schema: Dataclass of the scenario's kind; its `robot` becomes a name or an absolute path.
-        name: Name or path.
-        overrides: Items "key.subkey=value" that replace what the file says.
+def robot_scope(scenario: Any, path: Path) -> Scope:
+    """What is round a scenario: its robot; names of files in it become absolute paths.
 
     Raises:
-        ScenarioError: Unknown or malformed scenario.
-        RobotFileError: Its robot's file does not describe a possible robot.
+        RobotFileError: Its robot's file, or that of one which is believed in, is not accepted.
     """
-    path = scenario_file(name)
-    try:
-        scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
-    except ScenarioError as problem:
-        raise ScenarioError(*problem.problems, *_unknown_robot(path, overrides)) from problem
     scenario.robot = resolve_robot_path(path, scenario.robot)
     if scenario.world is not None:
         scenario.world.find_files(path.parent)
@@ -227,61 +201,48 @@ def load_with_robot(schema: type[S], name: str, overrides: Sequence[str]) -> tup
     for section, key in ((camera, "model"), (perturbations, "camera_model")):
         if getattr(section, key, None) is not None:
             setattr(section, key, resolved_camera(getattr(section, key), path.parent))
-    if getattr(perturbations, "believed_robot", None) is not None:
-        _check_belief(scenario, robot, path)
-    return scenario, robot, path
+    if perturbations is not None and getattr(perturbations, "believed_robot", None) is not None:
+        perturbations.believed_robot = resolve_robot_path(path, perturbations.believed_robot)
+        try:
+            load_robot(perturbations.believed_robot, "a scenario")
+        except RobotFileError as problem:
+            where = f"{path}: perturbations.believed_robot"
+            raise RobotFileError(*problem.within(where)) from problem
+    return Scope(scenario, path, robot)
 
 
-def load_with_mechanism(
-    schema: type[M], name: str, overrides: Sequence[str]
-) -> tuple[M, Mechanism, Path]:
-    """A scenario of a mechanism by name or by path, the mechanism, and the scenario's file.
-
-    Args:
-        schema: Dataclass of its kind; its `mechanism` becomes a name or an absolute path.
-        name: Name or path.
-        overrides: Items "key.subkey=value" that replace what the file says.
+def mechanism_scope(scenario: Any, path: Path) -> Scope:
+    """What is round a scenario of a mechanism: that; its name becomes an absolute path.
 
     Raises:
-        ScenarioError: Unknown or malformed scenario.
-        RobotFileError: Its mechanism's file is not accepted.
+        ScenarioError: There is no such mechanism.
+        RobotFileError: Its file is not accepted.
     """
-    path = scenario_file(name)
-    scenario = load_typed(schema, path, error=ScenarioError, overrides=overrides)
     scenario.mechanism = given = resolve_robot_path(path, scenario.mechanism)
     if "/" not in given and given not in mechanism_names():
         raise ScenarioError(
             f"{path}: mechanism: found {given!r}; {closest(given, mechanism_names())}, or a path"
         )
     try:
-        mechanism = load_mechanism(scenario.mechanism)
+        return Scope(scenario, path, load_mechanism(given))
     except RobotFileError as problem:
         raise RobotFileError(*problem.within(f"{path}: mechanism")) from problem
-    return scenario, mechanism, path
 
 
-def _check_belief(scenario: Any, robot: Robot, path: Path) -> None:
-    """Finds the file of the robot that is believed in, and compares it with the simulated one."""
-    perturbations, where = scenario.perturbations, f"{path}: perturbations.believed_robot"
-    perturbations.believed_robot = resolve_robot_path(path, perturbations.believed_robot)
-    try:
-        believed = load_robot(perturbations.believed_robot, "a scenario")
-    except RobotFileError as problem:
-        raise RobotFileError(*problem.within(where)) from problem
+def belief_refusals(scope: Scope) -> Iterator[Refusal]:
+    """A robot that is believed in and is another than the simulated one."""
+    scenario, robot, key = scope.whole, scope.robot, "perturbations.believed_robot"
+    if getattr(scenario.perturbations, "believed_robot", None) is None:
+        return
+    believed = load_robot(scenario.perturbations.believed_robot, "a scenario")
     true, found = len(robot.cables), len(believed.cables)
     if (true, robot.motion) != (found, believed.motion):
-        raise ScenarioError(
-            f"{where}: found {found} cables and {believed.motion}; accepted: those of "
-            f"{robot.name}, {true} and {robot.motion}"
-        )
-    if not hasattr(scenario, "camera"):
-        return
-    mount = scenario.camera.mount
-    parents = [
+        accepted = f"those of {robot.name}, {true} and {robot.motion}"
+        yield key, f"{found} cables and {believed.motion}", accepted
+    mount = scenario.camera.mount if hasattr(scenario, "camera") else None
+    parent, other = (
         next((m.parent for m in one.cameras if m.name == mount), None) for one in (robot, believed)
-    ]
-    if parents[0] is not None and parents[0] != parents[1]:
-        raise ScenarioError(
-            f"{where}: found no camera mounting {mount} on the {parents[0]}; accepted: a robot "
-            f"with that of {robot.name}"
-        )
+    )
+    if parent is not None and parent != other:
+        found_there = f"no camera mounting {mount} on the {parent}"
+        yield key, found_there, f"a robot with that of {robot.name}"

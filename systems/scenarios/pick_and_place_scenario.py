@@ -1,21 +1,14 @@
-"""The schema of a scenario file for picking a box up and setting it down.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
+"""The schema of a scenario file for picking a box up and setting it down."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import Problems, ScenarioError
-from cdpr_drake.models.robot_schema import Pose, Robot
+from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.schema.fields import FASTEST, number, optional_section, section, text
-from cdpr_drake.schema.typed_yaml import closest
-from cdpr_drake.systems.robots.disturbances import check_disturbances
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Refusal, Scope, filled, settings
 from cdpr_drake.systems.robots.settings import PLANT, CableRobotSettings
 from cdpr_drake.systems.scenarios.files import PICK_AND_PLACE, VISUAL_SERVO
 from cdpr_drake.systems.scenarios.pick_and_place_settings import (
@@ -31,7 +24,7 @@ from cdpr_drake.systems.scenarios.pick_and_place_settings import (
 )
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
-from cdpr_drake.systems.worlds.checks import check_world
+from cdpr_drake.systems.worlds.checks import world_refusals
 
 DEAD_RECKONING = (
     "control_integration", "cable_lengths", "cable_lengths_elastic", "cable_lengths_pulleys",
@@ -43,54 +36,56 @@ LEVEL = 1e-9
 """Turn about x or y of a pose that counts as level [deg]."""
 
 
-@dataclass(kw_only=True)
+@settings
 class PlantIntegration:
     """How the robot is integrated, with the box, which the compiled engine does not have."""
 
-    engine: str = text("What moves the robot.", PLANT, choices=(PLANT,))
-    integrator: str = text(
-        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
-    )
-    max_step: float | None = number(
-        "Step; null: a share of the largest stable one, of cables, grip and contact.", "s", None,
-        above=0.0,
-    )  # fmt: skip
+    engine: Annotated[str, OneOf((PLANT,)), "What moves the robot."] = PLANT
+    integrator: Annotated[
+        str, OneOf(explicit_integrators()), "Explicit integrator of Drake, fixed step."
+    ] = "runge_kutta3"
+    max_step: Annotated[
+        float | None,
+        In("s", gt=0.0),
+        "Step; null: a share of the largest stable one, of cables, grip and contact.",
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class DeadReckoning:
     """How the robot knows its own pose, and goes on while it sees no tag."""
 
-    kind: str = text("Estimator.", "control_integration", choices=DEAD_RECKONING)
+    kind: Annotated[str, OneOf(DEAD_RECKONING), "Estimator."] = "control_integration"
 
 
-@dataclass(kw_only=True)
+@settings
 class PickAndPlaceScenario(CableRobotSettings, ScenarioHeader):
     """One run of a robot that looks for a box, takes it, and sets it down at a goal."""
 
-    kind: str = text("Kind of run.", choices=(PICK_AND_PLACE,))
-    initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
-    workpiece: WorkpieceSettings = section("The box.", WorkpieceSettings)
-    goal: GoalSettings = section("Where it is to go.", GoalSettings)
-    scatter: ScatterSettings = section(
-        "How far both truly are from there.", ScatterSettings, required=False
+    kind: Annotated[str, OneOf((PICK_AND_PLACE,)), "Kind of run."]
+    initial_pose: Annotated[Pose, "Pose of the platform in W at time 0."]
+    workpiece: Annotated[WorkpieceSettings, "The box."]
+    goal: Annotated[GoalSettings, "Where it is to go."]
+    scatter: Annotated[ScatterSettings, "How far both truly are from there."] = filled(
+        ScatterSettings
     )
-    gripper: GripperSettings = section("The gripper.", GripperSettings, required=False)
-    camera: BoxCameraSettings = section("The cameras.", BoxCameraSettings, required=False)
-    goal_camera: GoalCameraSettings | None = optional_section(
-        "A second camera, which looks at the goal; null: the first one looks at both."
+    gripper: Annotated[GripperSettings, "The gripper."] = filled(GripperSettings)
+    camera: Annotated[BoxCameraSettings, "The cameras."] = filled(BoxCameraSettings)
+    goal_camera: Annotated[
+        GoalCameraSettings | None,
+        "A second camera, which looks at the goal; null: the first one looks at both.",
+    ] = None
+    cover: Annotated[CoverSettings | None, "What hides a tag for a while; null: nothing does."] = (
+        None
     )
-    cover: CoverSettings | None = optional_section(
-        "What hides a tag for a while; null: nothing does."
+    handling: Annotated[HandlingSettings, "The servo, and when phases end."] = filled(
+        HandlingSettings
     )
-    handling: HandlingSettings = section(
-        "The servo, and when phases end.", HandlingSettings, required=False
-    )
-    estimator: DeadReckoning = section("Dead reckoning.", DeadReckoning, required=False)
-    sensors: SensorSettings = section("Sensors of dead reckoning.", SensorSettings, required=False)
-    perturbations: HandlingErrors = section("Model errors.", HandlingErrors, required=False)
-    integration: PlantIntegration = section("Integration.", PlantIntegration, required=False)
-    log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)
+    estimator: Annotated[DeadReckoning, "Dead reckoning."] = filled(DeadReckoning)
+    sensors: Annotated[SensorSettings, "Sensors of dead reckoning."] = filled(SensorSettings)
+    perturbations: Annotated[HandlingErrors, "Model errors."] = filled(HandlingErrors)
+    integration: Annotated[PlantIntegration, "Integration."] = filled(PlantIntegration)
+    log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0
 
     @property
     def remote(self) -> None:
@@ -122,79 +117,55 @@ PLACES = 104_729
 """Stream of random numbers of a seed for the places of box and goal."""
 
 
-def check_pick_and_place(scenario: PickAndPlaceScenario, robot: Robot, path: Path) -> None:
-    """Refuses what cannot be done.
-
-    Raises:
-        ScenarioError: Names the file, the field, what was found and what is accepted.
-    """
-    problems = Problems(ScenarioError)
-    problems.add(*(f"{path}: {words}" for words in _problems(scenario, robot)))
-    problems.raise_any()
-    check_disturbances(scenario.disturbances, path)
+def pick_and_place_refusals(scope: Scope) -> Iterator[Refusal]:
+    """What cannot be done with a box."""
+    scenario, robot = scope.whole, scope.robot
     if scenario.failures is not None:
-        raise ScenarioError(
-            f"{path}: failures: found some with kind {PICK_AND_PLACE}; accepted: null, or kind "
-            f"{VISUAL_SERVO}"
-        )
-    check_world(
-        scenario.world, robot, scenario.initial_pose.transform(), path, compiled=False, stop=False
-    )
-
-
-def _problems(scenario: PickAndPlaceScenario, robot: Robot) -> Iterator[str]:
+        accepted = f"null, or kind {VISUAL_SERVO}"
+        yield "failures", f"some with kind {PICK_AND_PLACE}", accepted
     if not robot.motion_type().is_free:
-        yield f"robot: found {robot.name}, {robot.motion}; accepted: one that moves freely, 3R3T"
+        yield "robot", f"{robot.name}, {robot.motion}", "one that moves freely, 3R3T"
     if scenario.world is None or scenario.world.contact is None:
-        yield (
-            "world.contact: found null, so the box would fall through everything; accepted: {} or "
-            "more of the section"
-        )
+        found = "null, so the box would fall through everything"
+        yield "world.contact", found, "{} or more of the section"
     mounts = [mount.name for mount in robot.cameras if mount.parent == "platform"]
     if scenario.camera.mount not in mounts:
-        yield (
-            f"camera.mount: {scenario.camera.mount!r} is not on the platform of {robot.name}; "
-            f"{closest(scenario.camera.mount, mounts)}"
-        )
+        found = f"{scenario.camera.mount!r}, which is not on the platform of {robot.name}"
+        yield "camera.mount", found, f"one of {', '.join(mounts)}"
     flat = {"workpiece.pose": scenario.workpiece.pose, "goal.pose": scenario.goal.pose}
     for key, pose in flat.items():
         if float(np.max(np.abs(pose.angles_deg[:2]))) > LEVEL:
-            yield (
-                f"{key}.angles_deg: found {pose.angles_deg.tolist()}; accepted: 0, 0, any angle: "
-                "the box lies flat"
-            )
+            accepted = "0, 0, any angle: the box lies flat"
+            yield f"{key}.angles_deg", pose.angles_deg.tolist(), accepted
     poses = {"initial_pose": scenario.initial_pose, **flat}
     lower, upper = robot.frame.bounds()
     for key, pose in poses.items():
         if np.any(pose.position < lower) or np.any(pose.position > upper):
-            yield (
-                f"{key}.position: found {pose.position.tolist()}; accepted: within the frame, "
-                f"{lower.tolist()} to {upper.tolist()} [m]"
-            )
-    yield from _tag_problems(scenario)
+            accepted = f"within the frame, {lower.tolist()} to {upper.tolist()} [m]"
+            yield f"{key}.position", pose.position.tolist(), accepted
+    yield from _tags(scenario)
     if scenario.winches.kind != "ideal":
-        yield f"winches.kind: found {scenario.winches.kind}; accepted: ideal"
-    if scenario.cover is not None and scenario.cover.duration >= scenario.handling.phase_limit:
-        yield (
-            f"cover.duration: found {scenario.cover.duration:g} s; accepted: shorter than "
-            f"handling.phase_limit, {scenario.handling.phase_limit:g} s"
-        )
+        yield "winches.kind", scenario.winches.kind, "ideal"
+    limit = scenario.handling.phase_limit
+    if scenario.cover is not None and scenario.cover.duration >= limit:
+        found = f"{scenario.cover.duration:g} s"
+        yield "cover.duration", found, f"shorter than handling.phase_limit, {limit:g} s"
+    start = scenario.initial_pose.transform()
+    yield from world_refusals(scenario.world, robot, start, compiled=False, stop=False)
 
 
-def _tag_problems(scenario: PickAndPlaceScenario) -> Iterator[str]:
+def _tags(scenario: PickAndPlaceScenario) -> Iterator[Refusal]:
     box, goal = scenario.workpiece, scenario.goal
     if box.tag.tag_id == goal.tag.tag_id:
-        yield f"goal.tag.tag_id: found {goal.tag.tag_id}, that of the box; accepted: another"
+        yield "goal.tag.tag_id", f"{goal.tag.tag_id}, that of the box", "another"
     half, edge = 0.5 * box.size[:2], 0.625 * box.tag.size
     if np.any(np.abs(box.tag.position) + edge > half):
-        yield (
-            f"workpiece.tag.position: found {box.tag.position.tolist()}, where the tag with its "
-            f"white rim, {1.25 * box.tag.size:g} m wide, is not on the box's upper face; accepted: "
-            f"within {(half - edge).tolist()} m of its middle"
+        found = (
+            f"{box.tag.position.tolist()}, where the tag with its white rim, "
+            f"{1.25 * box.tag.size:g} m wide, is not on the box's upper face"
         )
-    apart = np.abs(goal.tag.position) - 0.625 * goal.tag.size
-    if np.all(apart < half):
-        yield (
-            f"goal.tag.position: found {goal.tag.position.tolist()}, where the box lies on the tag "
-            "once it is set down; accepted: beside the box"
-        )
+        accepted = f"within {(half - edge).tolist()} m of its middle"
+        yield "workpiece.tag.position", found, accepted
+    if np.all(np.abs(goal.tag.position) - 0.625 * goal.tag.size < half):
+        found = f"{goal.tag.position.tolist()}, where the box lies on the tag once it is set down"
+        yield "goal.tag.position", found, "beside the box"

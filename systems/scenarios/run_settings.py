@@ -2,15 +2,13 @@
 
 `StopSettings` and `IntegrationSettings` are the two sections of a visual servo. `set_engine`
 chooses which engine moves the robot of a scenario that leaves the choice open.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import Annotated, Any, TypeVar
 
 from cdpr_drake.dynamics.explicit_kernel import METHODS
-from cdpr_drake.schema.fields import file_name, number, optional_section, switch, text, whole
+from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, settings
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, PLANT
 from cdpr_drake.systems.worlds.settings import WorldSettings
@@ -26,7 +24,7 @@ ENDINGS = tuple(
 """Outcomes that a file may expect: ends of a run, as `summary.json` names them."""
 
 
-@dataclass(kw_only=True)
+@settings
 class ExpectedEnd:
     """Expected outcome of the unmodified scenario; the package's tests check it.
 
@@ -34,96 +32,98 @@ class ExpectedEnd:
     the box's from its goal.
     """
 
-    outcome: str = text("Outcome, as summary.json names it.", choices=ENDINGS)
-    position: float | None = number(
-        "Largest distance at the end; null: any, as of a run that is not to arrive.", "m", None,
-        above=0.0,
-    )  # fmt: skip
-    rotation_deg: float | None = number(
-        "Largest angle at the end; null: any.", "deg", None, above=0.0
-    )
+    outcome: Annotated[str, OneOf(ENDINGS), "Outcome, as summary.json names it."]
+    position: Annotated[
+        float | None,
+        In("m", gt=0.0),
+        "Largest distance at the end; null: any, as of a run that is not to arrive.",
+    ] = None
+    rotation_deg: Annotated[
+        float | None, In("deg", gt=0.0), "Largest angle at the end; null: any."
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class RunHeader:
     """What a scenario is called, whatever it moves; all of them also have duration and expected."""
 
-    kind: str = text("Kind of run.")
-    name: str = file_name("Name, the same as that of its file.")
-    title: str = text("What it shows, in one line.", "")
-    source: str = text("Where its values stand.", "")
+    kind: Annotated[Text, "Kind of run."]
+    name: Annotated[Name, "Name, the same as that of its file."]
+    title: Annotated[Text, "What it shows, in one line."] = ""
+    source: Annotated[Text, "Where its values stand."] = ""
 
 
-@dataclass(kw_only=True)
+@settings
 class ScenarioHeader(RunHeader):
     """What a scenario is called, which robot it moves, and how long it runs."""
 
-    robot: str = text(
-        "Robot by name, or path of a robot file, from this file or the working folder."
-    )
-    duration: float = number("Longest simulated time.", "s", above=0.0)
-    seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
-    world: WorldSettings | None = optional_section(
-        "What stands and moves round the robot; null: nothing but a floor to look at."
-    )
-    expected: ExpectedEnd | None = optional_section(
-        "How a run of the file as it stands ends; null: nothing is expected. It changes no run."
-    )
+    robot: Annotated[
+        Text, "Robot by name, or path of a robot file, from this file or the working folder."
+    ]
+    duration: Annotated[float, In("s", gt=0.0), "Longest simulated time."]
+    seed: Annotated[int, In(ge=0), "Seed of noise and random directions."] = 0
+    world: Annotated[
+        WorldSettings | None,
+        "What stands and moves round the robot; null: nothing but a floor to look at.",
+    ] = None
+    expected: Annotated[
+        ExpectedEnd | None,
+        "How a run of the file as it stands ends; null: nothing is expected. It changes no run.",
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class StopSettings:
     """When the run ends before its duration is over."""
 
-    position: float = number("Measured distance that counts as reached.", "m", above=0.0)
-    rotation_deg: float = number("Measured angle that counts as reached.", "deg", above=0.0)
-    hold: float = number("Time for which both must hold.", "s", 0.5, at_least=0.0)
-    target_lost: float = number(
-        "Time without the target after which the run ends.", "s", 2.0, above=0.0
-    )
-    broken_cable: bool = switch(
+    position: Annotated[float, In("m", gt=0.0), "Measured distance that counts as reached."]
+    rotation_deg: Annotated[float, In("deg", gt=0.0), "Measured angle that counts as reached."]
+    hold: Annotated[float, In("s", ge=0.0), "Time for which both must hold."] = 0.5
+    target_lost: Annotated[
+        float, In("s", gt=0.0), "Time without the target after which the run ends."
+    ] = 2.0
+    broken_cable: Annotated[
+        Switch,
         "Whether the run ends when a cable passes the breaking load that the robot's file gives.",
-        False,
-    )
-    contact: bool = switch(
-        "Whether the run ends when the platform touches something of the world.", False
-    )
+    ] = False
+    contact: Annotated[
+        Switch, "Whether the run ends when the platform touches something of the world."
+    ] = False
 
 
-@dataclass(kw_only=True)
+@settings
 class IntegrationSettings:
     """How the robot is integrated."""
 
-    engine: str = text(
-        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event; "
-        "automatic: the plant, but for repeated runs and those of more than ten minutes.",
-        AUTOMATIC,
-        choices=ENGINES,
-    )
-    loop: str = text(
-        "What steps a servo: a Drake diagram, or one compiled loop without; automatic: the "
-        "diagram, but for repeated runs that the loop can do.",
-        AUTOMATIC,
-        choices=LOOPS,
-    )
-    integrator: str = text(
+    engine: Annotated[
+        str,
+        OneOf(ENGINES),
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to "
+        "event; automatic: the plant, but for repeated runs and those of more than ten "
+        "minutes.",
+    ] = AUTOMATIC
+    loop: Annotated[
+        str,
+        OneOf(LOOPS),
+        "What steps a servo: a Drake diagram, or one compiled loop without; automatic: "
+        "the diagram, but for repeated runs that the loop can do.",
+    ] = AUTOMATIC
+    integrator: Annotated[
+        str,
+        OneOf(METHODS),
         "Method, fixed step; semi_implicit, which no stiffness limits, by the engine compiled.",
-        "runge_kutta3",
-        choices=tuple(METHODS),
-    )
-    max_step: float | None = number(
-        "Step; null: a share of the largest stable one, from the robot's vibrations, or 1 ms with "
-        "semi_implicit.",
-        "s",
-        None,
-        above=0.0,
-    )
-    accuracy: float | None = number(
+    ] = "runge_kutta3"
+    max_step: Annotated[
+        float | None,
+        In("s", gt=0.0),
+        "Step; null: a share of the largest stable one, from the robot's vibrations, or 1"
+        " ms with semi_implicit.",
+    ] = None
+    accuracy: Annotated[
+        float | None,
+        In("m and rad", gt=0.0),
         "Largest estimated error of one step, to which the engine compiled shortens it; null: any.",
-        "m and rad",
-        None,
-        above=0.0,
-    )
+    ] = None
 
 
 LONG_RUN = 600.0

@@ -2,12 +2,10 @@
 
 `TensionScenario` is the file; its sections stand before it. Section `predictive` asks for tensions
 by a program over the time ahead.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -19,17 +17,7 @@ from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.planning.horizon import View
-from cdpr_drake.schema.fields import (
-    FASTEST,
-    array,
-    number,
-    optional_section,
-    section,
-    sections,
-    switch,
-    text,
-    whole,
-)
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, Text, filled, settings
 from cdpr_drake.systems.controllers.force_tracking import ForceControl
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
@@ -42,26 +30,26 @@ from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from cdpr_drake.trajectories.sampled_motion import read_motion
 
 
-@dataclass(kw_only=True)
+@settings
 class Stretch:
     """One stretch of the trajectory, from rest to rest."""
 
-    pose: Pose = section("Pose of the platform in W at its end.", Pose)
-    duration: float = number("Time that it takes.", "s", above=0.0)
+    pose: Annotated[Pose, "Pose of the platform in W at its end."]
+    duration: Annotated[float, In("s", gt=0.0), "Time that it takes."]
 
 
-@dataclass(kw_only=True)
+@settings
 class TrajectorySettings:
     """Poses that the platform passes, at rest in each, quintic time law in between; or a file."""
 
-    start: Pose | None = optional_section("Pose of the platform in W at time 0.")
-    pause: float = number("Rest before the motion.", "s", 0.0, at_least=0.0)
-    stretches: list[Stretch] = sections("The stretches, one after the other.", required=False)
-    file: str | None = text(
-        "Table of a motion in the place of start and stretches, as motion.csv of cdpr plan; null: "
-        "none.",
-        None,
-    )
+    start: Annotated[Pose | None, "Pose of the platform in W at time 0."] = None
+    pause: Annotated[float, In("s", ge=0.0), "Rest before the motion."] = 0.0
+    stretches: Annotated[list[Stretch], "The stretches, one after the other."] = filled(list)
+    file: Annotated[
+        Text | None,
+        "Table of a motion in the place of start and stretches, as motion.csv of cdpr "
+        "plan; null: none.",
+    ] = None
 
     def trajectory(self) -> PoseTrajectory:
         """The trajectory.
@@ -76,58 +64,59 @@ class TrajectorySettings:
         return PoseTrajectory(poses, tuple(s.duration for s in self.stretches), self.pause)
 
 
-@dataclass(kw_only=True)
+@settings
 class TorqueSettings:
     """The computed torque in task space."""
 
-    rate: float = number("Control steps per second.", "Hz", 1000.0, above=0.0, at_most=FASTEST)
-    stiffness: float = number("Gain Kp.", "1/s^2", at_least=0.0)
-    damping: float = number("Gain Kd.", "1/s", at_least=0.0)
-    balance: str = text(
-        "What tensions balance: the wrench; or its force alone, as on a point mass, so that "
-        "moments are not held and the platform turns as it will.",
-        WRENCH,
-        choices=BALANCES,
-    )
+    rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Control steps per second."] = 1000.0
+    stiffness: Annotated[float, In("1/s^2", ge=0.0), "Gain Kp."]
+    damping: Annotated[float, In("1/s", ge=0.0), "Gain Kd."]
+    balance: Annotated[
+        str,
+        OneOf(BALANCES),
+        "What tensions balance: the wrench; or its force alone, as on a point mass, so "
+        "that moments are not held and the platform turns as it will.",
+    ] = WRENCH
 
     def gains(self) -> TaskGains:
         """The gains."""
         return TaskGains(self.stiffness, self.damping)
 
 
-@dataclass(kw_only=True)
+@settings
 class DrivenCableSettings:
     """The simulated cables: massless, inextensible, with tensions as commanded."""
 
-    pulleys: bool = switch("Whether the cables run over the robot's pulleys.", False)
+    pulleys: Annotated[Switch, "Whether the cables run over the robot's pulleys."] = False
 
 
-@dataclass(kw_only=True)
+@settings
 class DistributionSettings:
     """The tension distribution."""
 
-    method: str = text("Method.", "quadratic_program", choices=METHODS)
-    limits: np.ndarray | None = array(
-        "Smallest and largest tension; null: the robot's.", "N", (2,), None, at_least=0.0
-    )
-    reference: float | None = number(
-        "Wanted tension of all cables, for reference_program.", "N", None, at_least=0.0
-    )
-    pulleys: bool = switch("Whether it reckons with the pulleys, where there are any.", True)
+    method: Annotated[str, OneOf(METHODS), "Method."] = "quadratic_program"
+    limits: Annotated[
+        np.ndarray | None, In("N", 2, ge=0.0), "Smallest and largest tension; null: the robot's."
+    ] = None
+    reference: Annotated[
+        float | None, In("N", ge=0.0), "Wanted tension of all cables, for reference_program."
+    ] = None
+    pulleys: Annotated[Switch, "Whether it reckons with the pulleys, where there are any."] = True
 
 
-@dataclass(kw_only=True)
+@settings
 class PredictiveSettings:
     """Predictive control in the place of computed torque, at the rate of `controller`.
 
     Its program takes a millisecond or more: rates of 50 to 200 Hz are usual.
     """
 
-    steps: int = whole("Steps of control that it looks ahead.", 10, at_least=2, at_most=100)
-    mount: str | None = text(
-        "Mounting on the platform of the camera that keeps `points` in view; null: none.", None
-    )
-    points: np.ndarray | None = array("Points in W that stay in view.", "m", (None, 3), None)
+    steps: Annotated[int, In(ge=2, le=100), "Steps of control that it looks ahead."] = 10
+    mount: Annotated[
+        Text | None,
+        "Mounting on the platform of the camera that keeps `points` in view; null: none.",
+    ] = None
+    points: Annotated[np.ndarray | None, In("m", None, 3), "Points in W that stay in view."] = None
 
     def view(self, robot: Robot) -> View | None:
         """What is kept in view.
@@ -152,79 +141,81 @@ class PredictiveSettings:
         return View(found[0].pose.transform(), slopes, self.points.T)
 
 
-@dataclass(kw_only=True)
+@settings
 class StepSettings:
     """How the robot is integrated."""
 
-    engine: str = text(
-        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to event; "
-        "automatic: the plant, but for repeated runs and those of more than ten minutes.",
-        AUTOMATIC,
-        choices=ENGINES,
-    )
-    integrator: str = text(
-        "Explicit integrator of Drake, fixed step.", "runge_kutta3", choices=explicit_integrators()
-    )
-    max_step: float = number("Step.", "s", 1e-3, above=0.0)
+    engine: Annotated[
+        str,
+        OneOf(ENGINES),
+        "What moves the robot: Drake's MultibodyPlant, or compiled steps from event to "
+        "event; automatic: the plant, but for repeated runs and those of more than ten "
+        "minutes.",
+    ] = AUTOMATIC
+    integrator: Annotated[
+        str, OneOf(explicit_integrators()), "Explicit integrator of Drake, fixed step."
+    ] = "runge_kutta3"
+    max_step: Annotated[float, In("s", gt=0.0), "Step."] = 0.001
 
 
-@dataclass(kw_only=True)
+@settings
 class TensionBelief:
     """What the controller believes wrongly; the simulated robot stays as its file says."""
 
-    believed_robot: str | None = text(
-        "Robot by name, or path of a robot file, whose platform and cables computed torque and "
-        "tension distribution believe in, such as what cdpr identify wrote; null: the robot that "
-        "is simulated.",
-        None,
-    )
+    believed_robot: Annotated[
+        Text | None,
+        "Robot by name, or path of a robot file, whose platform and cables computed "
+        "torque and tension distribution believe in, such as what cdpr identify wrote; "
+        "null: the robot that is simulated.",
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class TensionStop:
     """When the run ends before its duration is over."""
 
-    contact: bool = switch(
-        "Whether the run ends when the platform touches something of the world.", False
-    )
+    contact: Annotated[
+        Switch, "Whether the run ends when the platform touches something of the world."
+    ] = False
 
 
-@dataclass(kw_only=True)
+@settings
 class TensionScenario(ScenarioHeader):
     """One run of a robot that follows a trajectory by commanded tensions."""
 
-    kind: str = text("Kind of run.", choices=(TENSION_CONTROL,))
-    cables: DrivenCableSettings = section(
-        "The simulated cables.", DrivenCableSettings, required=False
+    kind: Annotated[str, OneOf((TENSION_CONTROL,)), "Kind of run."]
+    cables: Annotated[DrivenCableSettings, "The simulated cables."] = filled(DrivenCableSettings)
+    damping: Annotated[
+        DampingSettings,
+        "Damping of the simulated platform, which the controller knows unless it believes"
+        " in another robot.",
+    ] = filled(DampingSettings)
+    trajectory: Annotated[TrajectorySettings, "Desired motion."]
+    controller: Annotated[TorqueSettings, "Computed torque."]
+    distribution: Annotated[DistributionSettings, "Tension distribution."] = filled(
+        DistributionSettings
     )
-    damping: DampingSettings = section(
-        "Damping of the simulated platform, which the controller knows unless it believes in "
-        "another robot.",
-        DampingSettings, required=False,
-    )  # fmt: skip
-    trajectory: TrajectorySettings = section("Desired motion.", TrajectorySettings)
-    controller: TorqueSettings = section("Computed torque.", TorqueSettings)
-    distribution: DistributionSettings = section(
-        "Tension distribution.", DistributionSettings, required=False
+    predictive: Annotated[
+        PredictiveSettings | None,
+        "Tensions by a program over the time ahead, in the place of computed torque; null: none.",
+    ] = None
+    force_control: Annotated[
+        ForceControl | None,
+        "How the platform answers forces, by the engine plant; null: as computed torque does.",
+    ] = None
+    disturbances: Annotated[
+        DisturbanceSettings | None, "What pushes the platform, by the engine plant; null: nothing."
+    ] = None
+    integration: Annotated[StepSettings, "Integration."] = filled(StepSettings)
+    perturbations: Annotated[TensionBelief, "What the controller believes wrongly."] = filled(
+        TensionBelief
     )
-    predictive: PredictiveSettings | None = optional_section(
-        "Tensions by a program over the time ahead, in the place of computed torque; null: none."
-    )
-    force_control: ForceControl | None = optional_section(
-        "How the platform answers forces, by the engine plant; null: as computed torque does."
-    )
-    disturbances: DisturbanceSettings | None = optional_section(
-        "What pushes the platform, by the engine plant; null: nothing."
-    )
-    integration: StepSettings = section("Integration.", StepSettings, required=False)
-    perturbations: TensionBelief = section(
-        "What the controller believes wrongly.", TensionBelief, required=False
-    )
-    remote: RemoteSettings | None = optional_section(
-        "A process outside in the place of a block, see cdpr serve; null: none."
-    )
-    stop: TensionStop = section("When the run ends early.", TensionStop, required=False)
-    log_rate: float = number("Rows of the log per second.", "Hz", 100.0, above=0.0, at_most=FASTEST)
+    remote: Annotated[
+        RemoteSettings | None,
+        "A process outside in the place of a block, see cdpr serve; null: none.",
+    ] = None
+    stop: Annotated[TensionStop, "When the run ends early."] = filled(TensionStop)
+    log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 100.0
 
     @property
     def plant_alone(self) -> bool:

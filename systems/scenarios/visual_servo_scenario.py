@@ -2,22 +2,12 @@
 
 `VisualServoSettings` are all settings of a visual servo on a robot: what it looks at, how it moves,
 what it believes. `Scenario` adds the robot, and when and how it is run.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from dataclasses import dataclass
+from typing import Annotated
 
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import (
-    FASTEST,
-    number,
-    optional_section,
-    section,
-    sections,
-    text,
-    whole,
-)
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
 from cdpr_drake.systems.controllers.emergency import EmergencySettings
@@ -46,48 +36,56 @@ from cdpr_drake.systems.scenarios.run_settings import (
 from cdpr_drake.systems.sensors.sensor_settings import SensorSuite
 
 
-@dataclass(kw_only=True)
+@settings
 class VisualServoSettings:
     """A visual servo on a robot: camera, target, law, estimator, sensors and model errors."""
 
-    seed: int = whole("Seed of noise and random directions.", 0, at_least=0)
-    initial_pose: Pose = section("Pose of the platform in W at time 0.", Pose)
-    desired: Pose = section("Desired pose of the target in the camera frame.", Pose)
-    next_tasks: list[NextTask] = sections(
-        "Desired poses that take over later, without a jump of the velocity.", required=False
-    )
-    target: TargetSettings = section("What the camera looks at.", TargetSettings)
-    camera: CameraSettings = section("The camera.", CameraSettings, required=False)
-    controller: ControllerSettings = section("The visual servo.", ControllerSettings)
-    trajectory: FeatureTrajectory | None = optional_section(
-        "A path of the features to track; null: straight for the desired ones."
-    )
-    open_loop: OpenLoopSettings | None = optional_section(
-        "A planned motion of the platform instead of visual servoing; null: none."
-    )
-    pose_plan: PosePlanSettings | None = optional_section(
-        "A planned way to the pose from which the target is seen as desired, instead of visual "
-        "servoing; null: none."
-    )
-    estimator: EstimatorSettings = section("The estimator.", EstimatorSettings, required=False)
-    sensors: SensorSuite = section("Sensors.", SensorSuite, required=False)
-    tension_management: TensionManagement | None = optional_section(
-        "What takes up slack beside the servo; null: nobody looks after the tensions."
-    )
-    wrench_estimation: WrenchEstimation | None = optional_section(
-        "An estimate of what pushes the platform, which is logged; null: none."
-    )
-    adaptation: Adaptation | None = optional_section(
-        "Exit and anchor points and lengths at the start, learnt while the servo runs; null: what "
-        "is believed at the start stays."
-    )
-    torque_control: TorqueControl | None = optional_section(
-        "How winches are commanded by torque, with winches.mode torque; null: its defaults."
-    )
-    perturbations: Perturbations = section("Model errors.", Perturbations, required=False)
-    remote: RemoteSettings | None = optional_section(
-        "A process outside in the place of a block, see cdpr serve; null: none."
-    )
+    seed: Annotated[int, In(ge=0), "Seed of noise and random directions."] = 0
+    initial_pose: Annotated[Pose, "Pose of the platform in W at time 0."]
+    desired: Annotated[Pose, "Desired pose of the target in the camera frame."]
+    next_tasks: Annotated[
+        list[NextTask], "Desired poses that take over later, without a jump of the velocity."
+    ] = filled(list)
+    target: Annotated[TargetSettings, "What the camera looks at."]
+    camera: Annotated[CameraSettings, "The camera."] = filled(CameraSettings)
+    controller: Annotated[ControllerSettings, "The visual servo."]
+    trajectory: Annotated[
+        FeatureTrajectory | None,
+        "A path of the features to track; null: straight for the desired ones.",
+    ] = None
+    open_loop: Annotated[
+        OpenLoopSettings | None,
+        "A planned motion of the platform instead of visual servoing; null: none.",
+    ] = None
+    pose_plan: Annotated[
+        PosePlanSettings | None,
+        "A planned way to the pose from which the target is seen as desired, instead of "
+        "visual servoing; null: none.",
+    ] = None
+    estimator: Annotated[EstimatorSettings, "The estimator."] = filled(EstimatorSettings)
+    sensors: Annotated[SensorSuite, "Sensors."] = filled(SensorSuite)
+    tension_management: Annotated[
+        TensionManagement | None,
+        "What takes up slack beside the servo; null: nobody looks after the tensions.",
+    ] = None
+    wrench_estimation: Annotated[
+        WrenchEstimation | None,
+        "An estimate of what pushes the platform, which is logged; null: none.",
+    ] = None
+    adaptation: Annotated[
+        Adaptation | None,
+        "Exit and anchor points and lengths at the start, learnt while the servo runs; "
+        "null: what is believed at the start stays.",
+    ] = None
+    torque_control: Annotated[
+        TorqueControl | None,
+        "How winches are commanded by torque, with winches.mode torque; null: its defaults.",
+    ] = None
+    perturbations: Annotated[Perturbations, "Model errors."] = filled(Perturbations)
+    remote: Annotated[
+        RemoteSettings | None,
+        "A process outside in the place of a block, see cdpr serve; null: none.",
+    ] = None
 
     def tasks(self) -> list[NextTask]:
         """The desired poses in the order of their times; the first one holds from time 0."""
@@ -101,17 +99,19 @@ class VisualServoSettings:
 DEFAULT_SCENARIO = "acrobot_pbvs_taut"
 
 
-@dataclass(kw_only=True)
+@settings
 class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     """One run of a visual servo on a cable robot: both, and when and how it is run."""
 
-    kind: str = text("Kind of run.", VISUAL_SERVO, choices=(VISUAL_SERVO,))
-    stop: StopSettings = section("When the run ends.", StopSettings)
-    integration: IntegrationSettings = section("Integration.", IntegrationSettings, required=False)
-    stability: StabilitySettings | None = optional_section(
-        "The stability criterion along the run, in its log; null: not logged."
-    )
-    emergency: EmergencySettings | None = optional_section(
-        "What is done when a cable has broken, beside section failures; null: nothing."
-    )
-    log_rate: float = number("Rows of the log per second.", "Hz", 50.0, above=0.0, at_most=FASTEST)
+    kind: Annotated[str, OneOf((VISUAL_SERVO,)), "Kind of run."] = VISUAL_SERVO
+    stop: Annotated[StopSettings, "When the run ends."]
+    integration: Annotated[IntegrationSettings, "Integration."] = filled(IntegrationSettings)
+    stability: Annotated[
+        StabilitySettings | None,
+        "The stability criterion along the run, in its log; null: not logged.",
+    ] = None
+    emergency: Annotated[
+        EmergencySettings | None,
+        "What is done when a cable has broken, beside section failures; null: nothing.",
+    ] = None
+    log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0

@@ -2,13 +2,11 @@
 
 `SENSORS` is their table; a new one is one entry of it. `SensorSettings` is the part of the scenario
 section `sensors` that chooses their types.
-
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 from pydrake.systems.framework import System
 
@@ -22,7 +20,7 @@ from cdpr_drake.models.sensor_catalogue import (
     pose_sensor_names,
     tension_sensor_names,
 )
-from cdpr_drake.schema.fields import number, text, texts
+from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, filled, repeated, settings
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
@@ -107,7 +105,7 @@ def _types(sensor: str) -> tuple[str, ...]:
     return (IDEAL, *SENSORS[sensor].types())
 
 
-@dataclass(kw_only=True)
+@settings
 class SensorSettings:
     """Types of sensors, from the catalogue; one is there if an estimator reads it or it is logged.
 
@@ -115,30 +113,38 @@ class SensorSettings:
     the table that has no key here is of its default type and reads at its rate.
     """
 
-    tension: str = text("Type of the tension sensors.", IDEAL, choices=_types("tension"))
-    encoder: str = text("Type of the encoders on the motors.", IDEAL, choices=_types("encoder"))
-    tracker: str = text(
-        "Type of what measures the platform's pose from outside.",
-        SENSORS["tracker"].default,
-        choices=_types("tracker"),
-    )
-    metrology: str = text(
+    tension: Annotated[str, OneOf(_types("tension")), "Type of the tension sensors."] = IDEAL
+    encoder: Annotated[str, OneOf(_types("encoder")), "Type of the encoders on the motors."] = IDEAL
+    tracker: Annotated[
+        str, OneOf(_types("tracker")), "Type of what measures the platform's pose from outside."
+    ] = SENSORS["tracker"].default
+    metrology: Annotated[
+        str,
+        OneOf(_types("metrology")),
         "Type of what measures the platform's pose for comparison; nothing uses it.",
-        SENSORS["metrology"].default,
-        choices=_types("metrology"),
+    ] = SENSORS["metrology"].default
+    tension_rate: Annotated[float | None, In("Hz", gt=0.0), "Readings; null: the type's."] = None
+    encoder_rate: Annotated[float | None, In("Hz", gt=0.0), "Readings; null: the type's."] = None
+    tracker_rate: Annotated[float | None, In("Hz", gt=0.0), "Readings; null: the type's."] = None
+    metrology_rate: Annotated[float | None, In("Hz", gt=0.0), "Readings; null: the type's."] = None
+    tension_accuracy: Annotated[
+        float | None,
+        In("N", ge=0.0),
+        "Largest constant error of a tension sensor beyond its reading on a slack cable; "
+        "0: that reading holds it; null: the type's.",
+    ] = None
+    log: Annotated[list[str], OneOf(SENSORS), "Sensors that are logged, used or not."] = filled(
+        list
     )
-    tension_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
-    encoder_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
-    tracker_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
-    metrology_rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
-    tension_accuracy: float | None = number(
-        "Largest constant error of a tension sensor beyond its reading on a slack cable; 0: that "
-        "reading holds it; null: the type's.",
-        "N",
-        None,
-        at_least=0.0,
-    )
-    log: list[str] = texts("Sensors that are logged, used or not.", choices=SENSORS)
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Rates beyond those of types, and sensors that are logged twice."""
+        yield from repeated(self.log, "log[{}]")
+        for sensor in SENSORS:
+            rate, largest = self.rate(sensor), self.largest_rate(sensor)
+            if rate is not None and largest is not None and rate > largest:
+                accepted = f"at most {largest:g} [Hz], that of {self.kind(sensor)}"
+                yield f"{sensor}_rate", f"{rate:g}", accepted
 
     def kind(self, sensor: str) -> str:
         """Type of one of `SENSORS`."""

@@ -1,10 +1,8 @@
-"""Scenario section `sensors`: all of it, with the sensors that look at the world and at motion.
+"""Scenario section `sensors`: all of it, with the sensors that look at the world and at motion."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
@@ -20,16 +18,19 @@ from cdpr_drake.models.sensor_catalogue import (
     load_range_sensor,
     range_sensor_names,
 )
-from cdpr_drake.schema.fields import (
+from cdpr_drake.schema.declarations import (
     FASTEST,
-    array,
-    file_name,
-    number,
-    optional_section,
-    section,
-    sections,
-    text,
-    whole,
+    In,
+    Name,
+    OneOf,
+    Refusal,
+    Scope,
+    Text,
+    filled,
+    number_words,
+    repeated,
+    settings,
+    values,
 )
 from cdpr_drake.systems.sensors.depth_sensor import binned
 from cdpr_drake.systems.sensors.pan_tilt import MODES, PanTiltJoints
@@ -46,36 +47,31 @@ def _origin() -> Pose:
     return Pose(position=np.zeros(3))
 
 
-@dataclass(kw_only=True)
+@settings
 class RangeSettings:
     """A laser scanner or a single beam; it is logged as scan_NAME."""
 
-    name: str = file_name("Name, which also tells its noise from that of others.")
-    type: str = text("Type of the catalogue.", "hokuyo", choices=range_sensor_names())
-    carrier: str = text(
-        "What carries it: platform, world, pan_tilt, target, or an obstacle that moves.",
-        PLATFORM,
-    )
-    pose: Pose = section(
+    name: Annotated[Name, "Name, which also tells its noise from that of others."]
+    type: Annotated[str, OneOf(range_sensor_names()), "Type of the catalogue."] = "hokuyo"
+    carrier: Annotated[
+        Text, "What carries it: platform, world, pan_tilt, target, or an obstacle that moves."
+    ] = PLATFORM
+    pose: Annotated[
+        Pose,
         "Pose of its frame S in the carrier: x ahead, y to the left, beams in the plane z = 0.",
-        _origin,
-        required=False,
-    )
-    rate: float | None = number("Scans; null: the type's.", "Hz", None, above=0.0)
-    beams: int | None = whole(
-        "Beams, over the same angles; null: the type's.", None, at_least=1, at_most=10_000
-    )
-    noise: float | None = number(
+    ] = filled(_origin)
+    rate: Annotated[float | None, In("Hz", gt=0.0), "Scans; null: the type's."] = None
+    beams: Annotated[
+        int | None, In(ge=1, le=10000), "Beams, over the same angles; null: the type's."
+    ] = None
+    noise: Annotated[
+        float | None,
+        In("m", ge=0.0),
         "Standard deviation of a reading, whatever its range; null: as the type has it.",
-        "m",
-        None,
-        at_least=0.0,
-    )
-    sees: str = text(
-        "What beams end on: what cameras see, or what things bump into.",
-        "perception",
-        choices=tuple(ROLES),
-    )
+    ] = None
+    sees: Annotated[
+        str, OneOf(ROLES), "What beams end on: what cameras see, or what things bump into."
+    ] = "perception"
 
     def model(self) -> RangeSensorModel:
         """The type, with what is set here."""
@@ -91,13 +87,13 @@ class RangeSettings:
         return load_range_sensor(self.type).rate_hz
 
 
-@dataclass(kw_only=True)
+@settings
 class InertialSettings:
     """An inertial measurement unit on the platform, logged as specific_force, angular_velocity."""
 
-    type: str = text("Type of the catalogue.", "adis16448", choices=inertial_sensor_names())
-    pose: Pose = section("Pose of its frame S on the platform.", _origin, required=False)
-    rate: float | None = number("Readings; null: the type's.", "Hz", None, above=0.0)
+    type: Annotated[str, OneOf(inertial_sensor_names()), "Type of the catalogue."] = "adis16448"
+    pose: Annotated[Pose, "Pose of its frame S on the platform."] = filled(_origin)
+    rate: Annotated[float | None, In("Hz", gt=0.0), "Readings; null: the type's."] = None
 
     def model(self) -> InertialSensorModel:
         """The type, with what is set here."""
@@ -109,32 +105,28 @@ class InertialSettings:
         return load_inertial_sensor(self.type).rate_hz
 
 
-@dataclass(kw_only=True)
+@settings
 class DepthSettings:
     """A depth camera, rendered; the middle row of its images is logged as depth_row."""
 
-    type: str = text("Type of the catalogue.", "kinect", choices=depth_sensor_names())
-    carrier: str = text(
-        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
-    )
-    pose: Pose = section(
-        "Pose of its frame C in the carrier: z ahead, x to the right, y down.",
-        _origin,
-        required=False,
-    )
-    rate: float | None = number("Images; null: the type's.", "Hz", None, above=0.0)
-    binning: int = whole(
+    type: Annotated[str, OneOf(depth_sensor_names()), "Type of the catalogue."] = "kinect"
+    carrier: Annotated[
+        Text, "What carries it: platform, world, target, or an obstacle that moves."
+    ] = PLATFORM
+    pose: Annotated[
+        Pose, "Pose of its frame C in the carrier: z ahead, x to the right, y down."
+    ] = filled(_origin)
+    rate: Annotated[float | None, In("Hz", gt=0.0), "Images; null: the type's."] = None
+    binning: Annotated[
+        int,
+        In(ge=1, le=64),
         "Pixels of the type's image, across and down, for which one is rendered.",
-        4,
-        at_least=1,
-        at_most=64,
-    )
-    noise: float | None = number(
+    ] = 4
+    noise: Annotated[
+        float | None,
+        In("m", ge=0.0),
         "Standard deviation of a depth, whatever its size; null: as the type has it.",
-        "m",
-        None,
-        at_least=0.0,
-    )
+    ] = None
 
     def model(self) -> DepthSensorModel:
         """The type, with what is set here."""
@@ -148,35 +140,46 @@ class DepthSettings:
         return load_depth_sensor(self.type).rate_hz
 
 
-@dataclass(kw_only=True)
+@settings
 class PanTiltSettings:
     """A head on two joints, which swings and carries range sensors; its angles are logged."""
 
-    carrier: str = text(
-        "What carries it: platform, world, target, or an obstacle that moves.", PLATFORM
+    carrier: Annotated[
+        Text, "What carries it: platform, world, target, or an obstacle that moves."
+    ] = PLATFORM
+    pose: Annotated[
+        Pose,
+        "Pose of the joints' frame M in the carrier: z ahead, x to the right, y down; pan"
+        " turns to the right about y, then tilt upwards about x.",
+    ] = filled(_origin)
+    arm: Annotated[
+        np.ndarray, In("m", 3), "Position of the head's origin from where the axes meet."
+    ] = values(0.0, 0.0, 0.0)
+    lower_deg: Annotated[np.ndarray, In("deg", 2), "Smallest angles, pan and tilt."] = values(
+        -160.0, -45.0
     )
-    pose: Pose = section(
-        "Pose of the joints' frame M in the carrier: z ahead, x to the right, y down; pan turns "
-        "to the right about y, then tilt upwards about x.",
-        _origin,
-        required=False,
+    upper_deg: Annotated[np.ndarray, In("deg", 2), "Largest angles."] = values(160.0, 90.0)
+    speed_deg: Annotated[np.ndarray, In("deg/s", 2, gt=0.0), "Largest speeds."] = values(
+        120.0, 120.0
     )
-    arm: np.ndarray = array(
-        "Position of the head's origin from where the axes meet.", "m", (3,), (0.0, 0.0, 0.0)
+    mode: Annotated[str, OneOf(MODES), "What its commands are."] = "position"
+    rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Looks at the command."] = 100.0
+    swing_deg: Annotated[
+        np.ndarray, In("deg", 2), "How far the commands swing to either side, pan and tilt."
+    ] = values(0.0, 0.0)
+    swing_period: Annotated[np.ndarray, In("s", 2, gt=0.0), "Periods of these sines."] = values(
+        4.0, 4.0
     )
-    lower_deg: np.ndarray = array("Smallest angles, pan and tilt.", "deg", (2,), (-160.0, -45.0))
-    upper_deg: np.ndarray = array("Largest angles.", "deg", (2,), (160.0, 90.0))
-    speed_deg: np.ndarray = array("Largest speeds.", "deg/s", (2,), (120.0, 120.0), above=0.0)
-    mode: str = text("What its commands are.", "position", choices=MODES)
-    rate: float = number("Looks at the command.", "Hz", 100.0, above=0.0, at_most=FASTEST)
-    swing_deg: np.ndarray = array(
-        "How far the commands swing to either side, pan and tilt.", "deg", (2,), (0.0, 0.0)
-    )
-    swing_period: np.ndarray = array("Periods of these sines.", "s", (2,), (4.0, 4.0), above=0.0)
-    counts_per_turn: int = whole("Counts of an encoder per turn.", 4096, at_least=4)
-    zero_error_deg: float = number(
-        "Standard deviation of an encoder's zero.", "deg", 0.0, at_least=0.0
-    )
+    counts_per_turn: Annotated[int, In(ge=4), "Counts of an encoder per turn."] = 4096
+    zero_error_deg: Annotated[
+        float, In("deg", ge=0.0), "Standard deviation of an encoder's zero."
+    ] = 0.0
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits with nothing between."""
+        if not np.all(self.lower_deg <= self.upper_deg):
+            accepted = f"at most upper_deg, {number_words(self.upper_deg)} [deg]"
+            yield "lower_deg", number_words(self.lower_deg), accepted
 
     def joints(self) -> PanTiltJoints:
         """The joints."""
@@ -189,30 +192,27 @@ class PanTiltSettings:
         )
 
 
-@dataclass(kw_only=True)
+@settings
 class OdometrySettings:
     """Odometry of the mobile robot that carries the target, logged as X_WO_odometry."""
 
-    rate: float = number("Samples.", "Hz", 50.0, above=0.0, at_most=FASTEST)
-    wheel_radius: float = number("Radius of the wheels.", "m", 0.02, above=0.0)
-    counts_per_turn: int = whole("Counts of an encoder per turn of a wheel.", 4096, at_least=4)
-    scale_error: float = number(
-        "Standard deviation of the relative error of a wheel's radius.", "-", 0.0, at_least=0.0
-    )
-    base_error: float = number(
+    rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Samples."] = 50.0
+    wheel_radius: Annotated[float, In("m", gt=0.0), "Radius of the wheels."] = 0.02
+    counts_per_turn: Annotated[int, In(ge=4), "Counts of an encoder per turn of a wheel."] = 4096
+    scale_error: Annotated[
+        float, In("-", ge=0.0), "Standard deviation of the relative error of a wheel's radius."
+    ] = 0.0
+    base_error: Annotated[
+        float,
+        In("-", ge=0.0, lt=0.2),
         "Standard deviation of the relative error of the wheels' distance.",
-        "-",
-        0.0,
-        at_least=0.0,
-        below=0.2,
-    )
-    slip: float = number(
-        "Standard deviation of what a wheel turns too much on one metre, growing with the root of "
-        "the way.",
-        "m/sqrt(m)",
-        0.0,
-        at_least=0.0,
-    )
+    ] = 0.0
+    slip: Annotated[
+        float,
+        In("m/sqrt(m)", ge=0.0),
+        "Standard deviation of what a wheel turns too much on one metre, growing with the"
+        " root of the way.",
+    ] = 0.0
 
     def wheels(self) -> WheelModel:
         """The wheels."""
@@ -225,7 +225,7 @@ class OdometrySettings:
         )
 
 
-@dataclass(kw_only=True)
+@settings
 class SensorSuite(SensorSettings):
     """Sensors of the robot: those that estimators read, and such as look round, which are logged.
 
@@ -233,72 +233,43 @@ class SensorSuite(SensorSettings):
     integration step.
     """
 
-    range_sensors: list[RangeSettings] = sections(
-        "Laser scanners and single beams.", required=False
-    )
-    imu: InertialSettings | None = optional_section("Inertial measurement unit; null: none.")
-    depth: DepthSettings | None = optional_section("Depth camera; null: none.")
-    pan_tilt: PanTiltSettings | None = optional_section("A head on two joints; null: none.")
-    odometry: OdometrySettings | None = optional_section(
-        "Odometry of the mobile robot that carries the target; null: none."
-    )
+    range_sensors: Annotated[list[RangeSettings], "Laser scanners and single beams."] = filled(list)
+    imu: Annotated[InertialSettings | None, "Inertial measurement unit; null: none."] = None
+    depth: Annotated[DepthSettings | None, "Depth camera; null: none."] = None
+    pan_tilt: Annotated[PanTiltSettings | None, "A head on two joints; null: none."] = None
+    odometry: Annotated[
+        OdometrySettings | None, "Odometry of the mobile robot that carries the target; null: none."
+    ] = None
 
     def looks_round(self) -> bool:
         """Whether there is a sensor that looks at the world or at motion."""
         others = (self.imu, self.depth, self.pan_tilt, self.odometry)
         return bool(self.range_sensors) or any(other is not None for other in others)
 
-    def problems(self, on_wheels: bool, bodies: Collection[str] = ()) -> list[str]:
-        """What is wrong with these sensors, one line each that begins with the field.
-
-        Args:
-            on_wheels: Whether a mobile robot carries the target.
-            bodies: Names of what moves round the robot and may carry a sensor.
-        """
-        found = self._carrier_problems(bodies)
-        for field, settings in self._typed().items():
-            rate, largest = settings.rate, settings.largest_rate()
-            if rate is not None and rate > largest:
-                found.append(
-                    f"{field}.rate: found {rate:g}; accepted: at most {largest:g} [Hz], that of "
-                    f"{settings.type}"
-                )
-        names = [sensor.name for sensor in self.range_sensors]
-        for k, sensor in enumerate(self.range_sensors):
-            if sensor.name in names[:k]:
-                found.append(
-                    f"range_sensors[{k}].name: found {sensor.name} twice; accepted: each once"
-                )
-        head = self.pan_tilt
-        if head is not None and not np.all(head.lower_deg <= head.upper_deg):
-            found.append("pan_tilt.lower_deg: accepted: at most upper_deg, of both joints [deg]")
-        if self.odometry is not None and not on_wheels:
-            found.append(
-                "odometry: found a target that no mobile robot carries; accepted: null, or "
-                "target.motion.mobile_robot"
-            )
-        return found
-
-    def _carrier_problems(self, bodies: Collection[str]) -> list[str]:
-        """Sensors on what is not there, one line each."""
-        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings] = {
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Sensors on what is not there, or faster than their type, and names that come twice."""
+        yield from super().refusals(scope)
+        yield from repeated((one.name for one in self.range_sensors), "range_sensors[{}].name")
+        target, world = scope.whole.target, scope.whole.world
+        there = [PLATFORM, WORLD, *(["target"] if target.carrier == "world" else [])]
+        there += [] if world is None else world.moving()
+        carried: dict[str, RangeSettings | DepthSettings | PanTiltSettings | None] = {
             f"range_sensors[{k}]": sensor for k, sensor in enumerate(self.range_sensors)
-        }
-        if self.depth is not None:
-            carried["depth"] = self.depth
-        if self.pan_tilt is not None:
-            carried["pan_tilt"] = self.pan_tilt
-        found = []
+        } | {"depth": self.depth, "pan_tilt": self.pan_tilt}
         for name, sensor in carried.items():
-            there = [PLATFORM, WORLD, *bodies]
-            if isinstance(sensor, RangeSettings) and self.pan_tilt is not None:
-                there.append(HEAD)
-            if sensor.carrier not in there:
-                found.append(
-                    f"{name}.carrier: found {sensor.carrier}, which is not there; accepted: "
-                    + ", ".join(there)[:200]
-                )
-        return found
+            on_head = isinstance(sensor, RangeSettings) and self.pan_tilt is not None
+            known = [*there, HEAD] if on_head else there
+            if sensor is not None and sensor.carrier not in known:
+                found = f"{sensor.carrier}, which is not there"
+                yield f"{name}.carrier", found, ", ".join(known)[:200]
+        for name, one in self._typed().items():
+            rate, largest = one.rate, one.largest_rate()
+            if rate is not None and rate > largest:
+                yield f"{name}.rate", f"{rate:g}", f"at most {largest:g} [Hz], that of {one.type}"
+        on_wheels = target.motion is not None and target.motion.mobile_robot is not None
+        if self.odometry is not None and not on_wheels:
+            found = "a target that no mobile robot carries"
+            yield "odometry", found, "null, or target.motion.mobile_robot"
 
     def _typed(self) -> dict[str, RangeSettings | InertialSettings | DepthSettings]:
         """Those that are of a type of the catalogue, by their place in the section."""

@@ -1,24 +1,27 @@
-"""Scenario section `world`: ground and obstacles round the robot, and whether they touch it.
+"""Scenario section `world`: ground and obstacles round the robot, and whether they touch it."""
 
-Drake's YAML loader reads the annotations themselves, so they are not postponed here.
-"""
-
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.schema.fields import (
-    array,
-    file_name,
-    number,
-    optional_section,
-    section,
-    sections,
-    switch,
-    text,
+from cdpr_drake.schema.declarations import (
+    Direction,
+    In,
+    Name,
+    OneOf,
+    Refusal,
+    Scope,
+    Switch,
+    Text,
+    filled,
+    repeated,
+    settings,
+    values,
 )
 from cdpr_drake.schema.input_files import input_there
 from cdpr_drake.systems.worlds.motions import BodyMotion, JointedBody, PathBody, SteadyBody
@@ -42,6 +45,12 @@ SMALLEST, FARTHEST = 1e-4, 1e3
 """Sizes of obstacles, and how far from the origin of W they may be [m]: beyond, distances of shapes
 are not good to a micrometre any more."""
 
+Near = Annotated[np.ndarray, In("m", 3, ge=-FARTHEST, le=FARTHEST)]
+"""A point that is not too far away."""
+
+SAME_POSE = 1e-9
+"""Distance [m] and angle [rad] between poses that count as the same."""
+
 ROOM_BELOW = 0.05
 """Below its frame a platform that may touch something is not lost yet, and plans may end there, so
 that it is set down on ground which is level with the frame [m]."""
@@ -53,85 +62,130 @@ TAKEN = ("world", "platform", "target", "pan_tilt")
 """Names by which sensors are put on something else."""
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleWaypoint:
     """Where a moving obstacle rests on its way."""
 
-    time: float = number("When it gets there.", "s", above=0.0)
-    pose: Pose = section("Pose of the obstacle in W.", Pose)
+    time: Annotated[float, In("s", gt=0.0), "When it gets there."]
+    pose: Annotated[Pose, "Pose of the obstacle in W."]
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleJoint:
     """A revolute joint to the world that is driven: angle = rate t + amplitude sin(2 pi t / T)."""
 
-    point: np.ndarray = array("A point of its axis in W.", "m", (3,))
-    axis: np.ndarray = array("Direction of its axis in W, of any length.", "-", (3,))
-    rate_deg: float = number("Rate of turning.", "deg/s", 0.0, at_least=-1e5, at_most=1e5)
-    amplitude_deg: float = number("Amplitude of swinging.", "deg", 0.0, at_least=0.0, at_most=1e4)
-    period: float = number("Period T of swinging.", "s", 1.0, at_least=1e-3)
+    point: Annotated[Near, "A point of its axis in W."]
+    axis: Annotated[Direction, "Direction of its axis in W, of any length."]
+    rate_deg: Annotated[float, In("deg/s", ge=-100000.0, le=100000.0), "Rate of turning."] = 0.0
+    amplitude_deg: Annotated[float, In("deg", ge=0.0, le=10000.0), "Amplitude of swinging."] = 0.0
+    period: Annotated[float, In("s", ge=0.001), "Period T of swinging."] = 1.0
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleMotion:
     """How an obstacle moves, whatever it meets: steadily, through waypoints, or on a joint."""
 
-    velocity: np.ndarray = array(
-        "Velocity in W.", "m/s", (3,), (0.0, 0.0, 0.0), at_least=-1e3, at_most=1e3
+    velocity: Annotated[np.ndarray, In("m/s", 3, ge=-1000.0, le=1000.0), "Velocity in W."] = values(
+        0.0, 0.0, 0.0
     )
-    angular_velocity_deg: np.ndarray = array(
-        "Angular velocity in W.", "deg/s", (3,), (0.0, 0.0, 0.0), at_least=-1e5, at_most=1e5
+    angular_velocity_deg: Annotated[
+        np.ndarray, In("deg/s", 3, ge=-100000.0, le=100000.0), "Angular velocity in W."
+    ] = values(0.0, 0.0, 0.0)
+    waypoints: Annotated[
+        list[ObstacleWaypoint],
+        "Poses at growing times, at rest in each, quintic in between; the first way "
+        "starts from the obstacle's pose.",
+    ] = filled(list)
+    repeat: Annotated[Switch, "Whether the way through the waypoints begins again at its end."] = (
+        False
     )
-    waypoints: list[ObstacleWaypoint] = sections(
-        "Poses at growing times, at rest in each, quintic in between; the first way starts from "
-        "the obstacle's pose.",
-        required=False,
-    )
-    repeat: bool = switch("Whether the way through the waypoints begins again at its end.", False)
-    joint: ObstacleJoint | None = optional_section("A joint that it turns on; null: none.")
+    joint: Annotated[ObstacleJoint | None, "A joint that it turns on; null: none."] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Several kinds of motion at once, times that do not grow, and a way that is none."""
+        kinds = {
+            "waypoints": bool(self.waypoints),
+            "a velocity": self.has_velocity(),
+            "a joint": self.joint is not None,
+        }
+        several = [words for words, there in kinds.items() if there]
+        if len(several) > 1:
+            yield "", " and ".join(several), "one of them"
+        times = [point.time for point in self.waypoints]
+        if times != sorted(set(times)):
+            yield "waypoints", f"the times {times}", "growing ones"
+        if self.repeat and not self.waypoints:
+            yield "repeat", "true without waypoints", "false"
 
     def has_velocity(self) -> bool:
         """Whether a constant velocity is asked for."""
         return bool(np.any(self.velocity) or np.any(self.angular_velocity_deg))
 
 
-@dataclass(kw_only=True)
+@settings
 class ObstacleSettings:
     """A body of the world. Its frame lies in the middle of a box, cylinder or sphere."""
 
-    name: str = file_name("Name, once in a world.")
-    kind: str = text("Its shape, or what its file is.", choices=DIMENSIONS)
-    size: np.ndarray | None = array(
-        "Edges of a box along x, y, z of its frame.", "m", (3,), None,
-        at_least=SMALLEST, at_most=FARTHEST,
-    )  # fmt: skip
-    radius: float | None = number(
-        "Of a cylinder or sphere.", "m", None, at_least=SMALLEST, at_most=FARTHEST
-    )
-    length: float | None = number(
-        "Of a cylinder, along z of its frame.", "m", None, at_least=SMALLEST, at_most=FARTHEST
-    )
-    file: str | None = text(
-        "A mesh (.obj, .gltf) or an SDFormat or URDF model, from this file or the working folder; "
-        "a mesh is solid where its convex hull is, joints of a model keep their angles.",
-        None,
-    )
-    scale: float = number("Metres per unit of a mesh.", "m", 1.0, at_least=1e-6, at_most=1e3)
-    pose: Pose = section("Pose in W at time 0.", Pose)
-    color: np.ndarray = array(
+    name: Annotated[Name, "Name, once in a world."]
+    kind: Annotated[str, OneOf(DIMENSIONS), "Its shape, or what its file is."]
+    size: Annotated[
+        np.ndarray | None,
+        In("m", 3, ge=SMALLEST, le=FARTHEST),
+        "Edges of a box along x, y, z of its frame.",
+    ] = None
+    radius: Annotated[
+        float | None, In("m", ge=SMALLEST, le=FARTHEST), "Of a cylinder or sphere."
+    ] = None
+    length: Annotated[
+        float | None, In("m", ge=SMALLEST, le=FARTHEST), "Of a cylinder, along z of its frame."
+    ] = None
+    file: Annotated[
+        Text | None,
+        "A mesh (.obj, .gltf) or an SDFormat or URDF model, from this file or the working"
+        " folder; a mesh is solid where its convex hull is, joints of a model keep their "
+        "angles.",
+    ] = None
+    scale: Annotated[float, In("m", ge=1e-06, le=1000.0), "Metres per unit of a mesh."] = 1.0
+    pose: Annotated[Pose, "Pose in W at time 0."]
+    color: Annotated[
+        np.ndarray,
+        In("-", 3, ge=0.0, le=1.0),
         "Red, green, blue; files that have colours keep theirs.",
-        "-",
-        (3,),
-        (0.72, 0.55, 0.38),
-        at_least=0.0,
-        at_most=1.0,
-    )
-    friction: float = number("Friction coefficient of its surface.", "-", 0.5, at_least=0.0)
-    motion: ObstacleMotion | None = optional_section("How it moves; null: it rests.")
+    ] = values(0.72, 0.55, 0.38)
+    friction: Annotated[float, In("-", ge=0.0), "Friction coefficient of its surface."] = 0.5
+    motion: Annotated[ObstacleMotion | None, "How it moves; null: it rests."] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Dimensions of another kind, none of its own, and places that are too far away."""
+        for name in ("size", "radius", "length", "file"):
+            is_there, is_needed = getattr(self, name) is not None, name in DIMENSIONS[self.kind]
+            if is_there and not is_needed:
+                yield name, f"one of a {self.kind}", "null"
+            elif is_needed and not is_there:
+                yield name, "null", f"a value, for kind {self.kind}"
+        motion = self.motion or ObstacleMotion()
+        places = {"pose": self.pose}
+        places |= {
+            f"motion.waypoints[{k}].pose": one.pose for k, one in enumerate(motion.waypoints)
+        }
+        for name, pose in places.items():
+            if np.any(np.abs(pose.position) > FARTHEST):
+                accepted = f"within {FARTHEST:g} m of the origin along every axis"
+                yield f"{name}.position", pose.position.tolist(), accepted
+        yield from way_back_refusals(self.pose.transform(), motion)
 
     def path(self) -> BodyMotion:
         """Its pose over time."""
         return body_motion(self.pose.transform(), self.motion or ObstacleMotion())
+
+
+def way_back_refusals(start: RigidTransform, motion: ObstacleMotion) -> Iterator[Refusal]:
+    """A way that shall begin again at its end and does not end where the body starts."""
+    if motion.repeat and motion.waypoints:
+        ends = motion.waypoints[-1].pose.transform()
+        if max(pose_error(ends, start)) > SAME_POSE:
+            found = "true, but the last waypoint is not the obstacle's pose"
+            yield "motion.repeat", found, "false, or a way that ends where it begins"
 
 
 def body_motion(start: RigidTransform, motion: ObstacleMotion) -> BodyMotion:
@@ -152,61 +206,54 @@ def _jointed(start: RigidTransform, joint: ObstacleJoint) -> JointedBody:
     )  # fmt: skip
 
 
-@dataclass(kw_only=True)
+@settings
 class GroundSettings:
     """Level ground under the frame and half its width around it."""
 
-    height: float = number("Its z in W.", "m", 0.0, at_least=-FARTHEST, at_most=FARTHEST)
-    friction: float = number("Friction coefficient of its surface.", "-", 0.5, at_least=0.0)
-    color: np.ndarray | None = array(
-        "Red, green, blue; null: grey. What is to be seen of it lies 1 mm lower, so that a target "
-        "on the ground hides it.",
-        "-",
-        (3,),
-        None,
-        at_least=0.0,
-        at_most=1.0,
-    )
+    height: Annotated[float, In("m", ge=-FARTHEST, le=FARTHEST), "Its z in W."] = 0.0
+    friction: Annotated[float, In("-", ge=0.0), "Friction coefficient of its surface."] = 0.5
+    color: Annotated[
+        np.ndarray | None,
+        In("-", 3, ge=0.0, le=1.0),
+        "Red, green, blue; null: grey. What is to be seen of it lies 1 mm lower, so that "
+        "a target on the ground hides it.",
+    ] = None
 
 
-@dataclass(kw_only=True)
+@settings
 class ContactSettings:
     """Compliant contact of the platform with ground and obstacles; cables touch nothing."""
 
-    model: str = text(
-        "point: at the corners of the platform, and where a face of it is met; hydroelastic: over "
-        "the area of contact, which also holds a platform that none of its corners holds.",
-        POINT,
-        choices=CONTACT_MODELS,
-    )
-    penetration: float = number(
-        "How deep the platform's weight presses its four lower corners into what they stand on; "
-        "the stiffness of contact follows from it and the platform's mass.",
-        "m",
-        1e-4,
-        at_least=1e-6,
-        at_most=1e-2,
-    )
-    dissipation: float | None = number(
-        "Hunt and Crossley's d, force = stiffness x depth x (1 + d x speed); null: critical "
-        "damping of the platform's vibration on its four corners.",
-        "s/m",
-        None,
-        at_least=0.0,
-    )
-    friction: float = number(
+    model: Annotated[
+        str,
+        OneOf(CONTACT_MODELS),
+        "point: at the corners of the platform, and where a face of it is met; "
+        "hydroelastic: over the area of contact, which also holds a platform that none of"
+        " its corners holds.",
+    ] = POINT
+    penetration: Annotated[
+        float,
+        In("m", ge=1e-06, le=0.01),
+        "How deep the platform's weight presses its four lower corners into what they "
+        "stand on; the stiffness of contact follows from it and the platform's mass.",
+    ] = 0.0001
+    dissipation: Annotated[
+        float | None,
+        In("s/m", ge=0.0),
+        "Hunt and Crossley's d, force = stiffness x depth x (1 + d x speed); null: "
+        "critical damping of the platform's vibration on its four corners.",
+    ] = None
+    friction: Annotated[
+        float,
+        In("-", ge=0.0),
         "Friction coefficient of the platform's surface; of two surfaces 2 a b / (a + b) counts.",
-        "-",
-        0.5,
-        at_least=0.0,
-    )
-    slip_speed: float = number(
-        "Below this speed of slipping friction is less than its full value, so that what sticks "
-        "creeps by less; a smaller one needs smaller steps.",
-        "m/s",
-        5e-3,
-        at_least=1e-6,
-    )
+    ] = 0.5
+    slip_speed: Annotated[
+        float,
+        In("m/s", ge=1e-06),
+        "Below this speed of slipping friction is less than its full value, so that what "
+        "sticks creeps by less; a smaller one needs smaller steps.",
+    ] = 0.005
 
 
 def found_file(file: str, folder: Path) -> str:
@@ -215,15 +262,25 @@ def found_file(file: str, folder: Path) -> str:
     return str((beside if input_there(beside) else Path(file)).absolute())
 
 
-@dataclass(kw_only=True)
+@settings
 class WorldSettings:
     """What stands and moves round the robot."""
 
-    ground: GroundSettings | None = optional_section("The ground; null: none.")
-    obstacles: list[ObstacleSettings] = sections("Bodies of the world.", required=False)
-    contact: ContactSettings | None = optional_section(
-        "Contact of the platform with them, {} for its defaults; null: it passes through."
-    )
+    ground: Annotated[GroundSettings | None, "The ground; null: none."] = None
+    obstacles: Annotated[list[ObstacleSettings], "Bodies of the world."] = filled(list)
+    contact: Annotated[
+        ContactSettings | None,
+        "Contact of the platform with them, {} for its defaults; null: it passes through.",
+    ] = None
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Names that come twice, or are those of something else."""
+        taken = [*TAKEN, *([] if self.ground is None else [GROUND])]
+        names = [obstacle.name for obstacle in self.obstacles]
+        yield from repeated(names, "obstacles[{}].name")
+        for k, name in enumerate(names):
+            if name in taken:
+                yield f"obstacles[{k}].name", name, f"not one of {', '.join(taken)}"
 
     def moving(self) -> list[str]:
         """Names of the obstacles that move."""

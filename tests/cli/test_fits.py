@@ -5,7 +5,6 @@ import json
 import cv2
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_dump_typed
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.fits.robots import calibrated_robot
@@ -18,6 +17,7 @@ from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_dynamics import dynamic_model
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.vision.apriltags import TagTarget
@@ -53,7 +53,7 @@ def test_a_tracker_calibrates_and_scenarios_believe_it(here, tracked, capsys):
     nominal = load_robot("acrobot_small")
     for cable, shift in zip(nominal.cables, shifts, strict=True):
         cable.exit_point = cable.exit_point + shift
-    (here / "nominal.yaml").write_text(yaml_dump_typed(nominal))
+    (here / "nominal.yaml").write_text(dump_typed(nominal))
     write_log(here / "log.csv", tracked)
     out = here / "out"
     words = ("calibrate", "nominal.yaml", "log.csv", *SIGMA, "--next=4", "--out", "out")

@@ -93,11 +93,11 @@ def write_inputs(folder: Path) -> None:
     """Writes all input files, with the generators of the tests."""
     import cv2
     import numpy as np
-    from pydrake.common.yaml import yaml_dump_typed
 
     from cdpr_drake.calibration import measurements
     from cdpr_drake.geometry.poses import pose_from_angles
     from cdpr_drake.models.robot_loader import load_robot
+    from cdpr_drake.schema.typed_yaml import dump_typed
     from tests.analyses.fits import logs, swings
     from tests.analyses.logs import recorders, test_replay
     from tests.cli import test_fits
@@ -143,7 +143,7 @@ def write_inputs(folder: Path) -> None:
     ):
         cable.exit_point = cable.exit_point + shift
     texts = {
-        "nominal.yaml": yaml_dump_typed(nominal),
+        "nominal.yaml": dump_typed(nominal),
         "gtgraffiti.txt": recorders.gtgraffiti(),
         "motive.csv": recorders.motive(),
         "motive_mm.csv": recorders.motive(units="Millimeters"),

@@ -3,12 +3,12 @@
 import cv2
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_dump_typed
 
 from cdpr_drake.analyses.reporting.provenance import write_run_inputs
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.diagrams.load import load_scenario
 
 K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])
@@ -92,7 +92,7 @@ def test_a_robot_and_a_scenario_take_it_and_what_is_not_used_is_said(tmp_path):
     assert camera.assumptions == "rate_hz: the file says none. Not used: rectification_matrix."
     robot = load_robot("acrobot_small")
     robot.cameras[0].model = "mine.xml"
-    robot_file = written(tmp_path / "robot.yaml", yaml_dump_typed(robot))
+    robot_file = written(tmp_path / "robot.yaml", dump_typed(robot))
     assert load_robot(str(robot_file)).cameras[0].model == str(path)
 
 

@@ -102,7 +102,7 @@ def test_a_new_robot_is_the_one_it_began_as(source, tmp_path):
     output, code = cdpr("new", "robot", "mine", "--from", source, "--out", tmp_path)
     assert code == 0, output
     text = (tmp_path / "mine.yaml").read_text()
-    assert "# Mass. A number > 0 [kg]." in text
+    assert "# Mass. A number > 0 and <= 1e+07 [kg]." in text
     mine, theirs = content_of(tmp_path / "mine.yaml"), content_of(models.robot_file(source))
     assert as_numbers(mine) == as_numbers({**theirs, "name": "mine"})
     _, code = cdpr("new", "robot", "mine", "--out", tmp_path)

@@ -202,13 +202,13 @@ def test_all_problems_of_a_file_are_said_at_once(load, tmp_path):
     file = str(tmp_path / "machine.yaml")
     assert [problem.removeprefix(file).partition(";")[0] for problem in caught.value.problems] == [
         "overrides dram: there is no key dram in the scenario",
+        ":1: mass: missing",
         ":2: share: found 7",
         ":3: sizes: unknown key",
         ":4: size[2]: found x",
-        ":5: parts[1].at: found [1, 2]",
         ":5: parts[1].label: missing",
+        ":5: parts[1].at: found [1, 2]",
         "overrides drum.turns: found 0",
-        ":1: mass: missing",
     ]
     assert str(caught.value).splitlines() == list(caught.value.problems)
 

@@ -2,56 +2,47 @@
 
 # Annotations are not postponed here: Drake's YAML loader reads them.
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pytest
 
 from cdpr_drake.errors import DataFileError
-from cdpr_drake.schema.fields import (
-    array,
-    number,
-    optional_section,
-    section,
-    sections,
-    switch,
-    text,
-    whole,
-)
+from cdpr_drake.schema.declarations import In, OneOf, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 
 
-@dataclass(kw_only=True)
+@settings
 class Drum:
     """A nested section that has defaults."""
 
-    radius: float = number("Radius.", "m", 0.04, above=0.0)
-    turns: int = whole("Turns.", 10, at_least=1)
+    radius: Annotated[float, In("m", gt=0.0), "Radius."] = 0.04
+    turns: Annotated[int, In(ge=1), "Turns."] = 10
 
 
-@dataclass(kw_only=True)
+@settings
 class Part:
     """An item of a list."""
 
-    label: str = text("Label.")
-    at: np.ndarray = array("Place.", "m", (3,), (0.0, 0.0, 0.0))
+    label: Annotated[Text, "Label."]
+    at: Annotated[np.ndarray, In("m", 3), "Place."] = values(0.0, 0.0, 0.0)
 
 
-@dataclass(kw_only=True)
+@settings
 class Machine:
     """One field of each kind."""
 
-    name: str = text("Name.")
-    mass: float = number("Mass.", "kg", above=0.0)
-    share: float = number("Share.", "-", 0.5, at_least=0.0, at_most=1.0)
-    torque: float | None = number("Torque.", "N m", None)
-    size: np.ndarray = array("Edges.", "m", (3,), (1.0, 1.0, 1.0), above=0.0)
-    table: np.ndarray = array("Table.", "m", (None, 2), ((0.0, 0.0),))
-    kind: str = text("Kind.", "small", choices=("small", "large"))
-    enabled: bool = switch("Enabled.", False)
-    drum: Drum = section("Drum.", Drum, required=False)
-    brake: Drum | None = optional_section("Brake.")
-    parts: list[Part] = sections("Parts.", required=False)
+    name: Annotated[Text, "Name."]
+    mass: Annotated[float, In("kg", gt=0.0), "Mass."]
+    share: Annotated[float, In("-", ge=0.0, le=1.0), "Share."] = 0.5
+    torque: Annotated[float | None, In("N m"), "Torque."] = None
+    size: Annotated[np.ndarray, In("m", 3, gt=0.0), "Edges."] = values(1.0, 1.0, 1.0)
+    table: Annotated[np.ndarray, In("m", None, 2), "Table."] = values((0.0, 0.0))
+    kind: Annotated[str, OneOf(("small", "large")), "Kind."] = "small"
+    enabled: Annotated[Switch, "Enabled."] = False
+    drum: Annotated[Drum, "Drum."] = filled(Drum)
+    brake: Annotated[Drum | None, "Brake."] = None
+    parts: Annotated[list[Part], "Parts."] = filled(list)
 
 
 GOOD = """\

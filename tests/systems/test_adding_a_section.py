@@ -1,24 +1,24 @@
 """A section of a scenario, as CONTRIBUTING.md says; other toys are in tests/recipes."""
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import pytest
 from pydrake.systems.framework import LeafSystem
 
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.errors import ScenarioError
-from cdpr_drake.schema.fields import number, section
+from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 QUICK = ["camera.kind=projected", "duration=0.2"]
 
 
-@dataclass(kw_only=True)
+@settings
 class Counter:
     """Counts, at its own rate: a toy of a section that brings a block."""
 
-    rate: float = number("Counts per second.", "Hz", 10.0, above=0.0)
+    rate: Annotated[float, In("Hz", gt=0.0), "Counts per second."] = 10.0
 
     def add_to(self, builder, blocks):
         """Adds the block beside the servo."""
@@ -39,11 +39,11 @@ class Counter:
         builder.AddNamedSystem("counter", Count(self.rate))
 
 
-@dataclass(kw_only=True)
+@settings
 class CountedScenario(Scenario):
     """A scenario with one section more."""
 
-    counter: Counter = section("A counter.", Counter, required=False)
+    counter: Annotated[Counter, "A counter."] = filled(Counter)
 
 
 def test_a_scenario_section():

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.schema.fields import FieldRule
+from cdpr_drake.schema.declarations import Setting
 
 SHORT = 3
 """Arrays of so many numbers that have to be there get a field for each number."""
 
 
-def field_words(rule: FieldRule, value: Any) -> str:
+def field_words(rule: Setting, value: Any) -> str:
     """A value of a schema's field as it stands in a form."""
     if value is None:
         return ""
@@ -37,21 +37,22 @@ def number_text(value: Any) -> str:
     return repr(number)
 
 
-def typed_value(rule: FieldRule, words: str) -> Any:
+def typed_value(rule: Setting, words: str) -> Any:
     """What a file gets of the words in a field; None where there are none and may be none."""
     words = words.strip()
     if not words and rule.nullable:
         return None
     if rule.kind == "array":
-        return [_number(word) for word in words.replace(",", " ").split()]
+        return [typed_number(word) for word in words.replace(",", " ").split()]
     if rule.kind == "texts":
         return [word.strip() for word in words.split(",") if word.strip()]
     if rule.kind in ("number", "whole"):
-        return _number(words)
+        return typed_number(words)
     return words
 
 
-def _number(words: str) -> float | int | str:
+def typed_number(words: str) -> float | int | str:
+    """A number of words, or the words where they are none."""
     try:
         return int(words)
     except ValueError:
@@ -62,16 +63,16 @@ def _number(words: str) -> float | int | str:
         return words
 
 
-def in_parts(rule: FieldRule) -> bool:
+def in_parts(rule: Setting) -> bool:
     """Whether a field is a row of fields, one for each number."""
     return rule.kind == "array" and rule.shape == (SHORT,) and not rule.nullable
 
 
-def axis_names(rule: FieldRule) -> tuple[str, str, str]:
+def axis_names(rule: Setting) -> tuple[str, str, str]:
     """Names of the three numbers of a field: along axes, or of angles."""
     return ("phi", "theta", "psi") if rule.unit in ("deg", "rad") else ("x", "y", "z")
 
 
-def hint(rule: FieldRule) -> str:
+def hint(rule: Setting) -> str:
     """What a field is and what it accepts, for who hesitates."""
     return f"{rule.doc} Accepted: {rule.accepts()}"

@@ -9,8 +9,7 @@ from typing import Any
 from nicegui import ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.panels.field_words import (
     axis_names,
@@ -18,6 +17,7 @@ from cdpr_drake.studio.panels.field_words import (
     hint,
     in_parts,
     number_text,
+    typed_number,
     typed_value,
 )
 from cdpr_drake.studio.workbench.document import Document
@@ -32,7 +32,7 @@ class _Cell:
     """One input: where its value is, its number in an array, and what it has to say."""
 
     place: Place
-    rule: FieldRule
+    rule: Setting
     index: int | None
     element: Any
     problem: Any
@@ -72,14 +72,14 @@ class SchemaForm:
 
     def fields(self, schema: type, place: Place, names: Sequence[str] | None = None) -> None:
         """Rows of label, fields and unit into the current slot; sections are left out."""
-        rules = rules_of(schema)
+        rules = settings_of(schema)
         with ui.element("div").classes("studio-form"):
             for name in rules if names is None else names:
-                rule = rules[name][0]
-                if rule.kind not in ("section", "sections"):
+                rule = rules[name]
+                if not rule.section:
                     self._row(rule, (*place, name), tuple(rules))
 
-    def _row(self, rule: FieldRule, place: Place, order: Sequence[str]) -> None:
+    def _row(self, rule: Setting, place: Place, order: Sequence[str]) -> None:
         name = str(place[-1])
         axes = f" {', '.join(axis_names(rule))}" if in_parts(rule) else ""
         label = ui.label(f"{name.replace('_', ' ')}{axes}").classes("studio-label")
@@ -92,14 +92,14 @@ class SchemaForm:
             self._cells.append(_Cell(**{**cell.__dict__, "problem": problem}))
             self._listen(self._cells[-1])
 
-    def cells(self, rule: FieldRule, place: Place, order: Sequence[str], problem: Any) -> None:
+    def cells(self, rule: Setting, place: Place, order: Sequence[str], problem: Any) -> None:
         """Inputs of one field into the current slot, whose problems a label shows."""
         for cell in self.inputs(rule, place, order, problem=problem):
             self._cells.append(cell)
             self._listen(cell)
 
     def inputs(
-        self, rule: FieldRule, place: Place, order: Sequence[str], problem: Any
+        self, rule: Setting, place: Place, order: Sequence[str], problem: Any
     ) -> list[_Cell]:
         """Makes the inputs of one field: one, or one for each number."""
         value = value_at(self._document.value, place)
@@ -112,7 +112,7 @@ class SchemaForm:
             )  # fmt: skip
         return made
 
-    def _input(self, rule: FieldRule, place: Place, index: int | None, value: Any) -> Any:
+    def _input(self, rule: Setting, place: Place, index: int | None, value: Any) -> Any:
         words = " ".join(str(key).replace("_", " ") for key in place)
         words += "" if index is None else f" {axis_names(rule)[index]}"
         name = _test_name(place, index)
@@ -174,7 +174,7 @@ class SchemaForm:
             return with_value(text, place, bool(typed), cell.order)
         if cell.index is None:
             return with_value(text, place, typed_value(rule, str(typed or "")), cell.order)
-        value: Any = typed_value(_NUMBER, str(typed or ""))
+        value: Any = typed_number(str(typed or ""))
         if has(load_yaml(text), (*place, cell.index)):
             return with_value(text, (*place, cell.index), value)
         whole = [float(item) for item in value_at(self._document.value, place)]
@@ -196,9 +196,6 @@ class SchemaForm:
         cell.element.props(add="error" if words else "", remove="" if words else "error")
         cell.problem.text = words
         cell.problem.set_visibility(bool(words))
-
-
-_NUMBER = FieldRule("", "number")
 
 
 def _test_name(place: Place, index: int | None) -> str:

@@ -8,15 +8,12 @@ from typing import Any
 from nicegui import ui
 
 from cdpr_drake.palette import nth_look
-from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.studio.panels.field_words import axis_names, hint, in_parts, typed_value
 from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.yaml_edit import with_item, with_value, without_item
-
-Rules = Mapping[str, tuple[FieldRule, Any]]
 
 
 class SchemaGroups:
@@ -60,13 +57,12 @@ class SchemaGroups:
         self._layout = layout
         self._form.clear()
         self._box.clear()
-        rules = rules_of(self._schema)
+        rules = settings_of(self._schema)
         names = [*self._first, *(name for name in rules if name not in self._first)]
         with self._box:
             for name in names:
-                rule, bare = rules[name]
-                if rule.kind in ("section", "sections"):
-                    self._group(name, rule, bare)
+                if rules[name].section:
+                    self._group(name, rules[name])
             with self._expansion("general", "General", "Name, motion, gravity and the like."):
                 self._form.fields(self._schema, ())
 
@@ -80,30 +76,33 @@ class SchemaGroups:
         made.on_value_change(fold)
         return made
 
-    def _group(self, name: str, rule: FieldRule, bare: type) -> None:
+    def _group(self, name: str, rule: Setting) -> None:
         title = name.replace("_", " ").capitalize()
         with self._expansion(name, title, rule.doc):
             if rule.kind == "sections":
-                self._table((name,), bare)
+                self._table((name,), rule.section)
             else:
-                self._section((name,), rule, bare)
+                self._section((name,), rule, rule.section)
 
-    def _section(self, place: Place, rule: FieldRule, bare: type) -> None:
-        """Fields of a section, then its own sections; of one that is not there how to add it."""
+    def _section(self, place: Place, rule: Setting | None, bare: type) -> None:
+        """Fields of a section, then its own sections; of one that is not there how to add it.
+
+        Without a setting it is an item of a list.
+        """
         if value_at(self._document.value, place) is None:
             self._add_button(place, rule, bare)
             return
         self._form.fields(bare, place)
-        for name, (inner, inner_bare) in rules_of(bare).items():
-            if inner.kind not in ("section", "sections"):
+        for name, inner in settings_of(bare).items():
+            if not inner.section:
                 continue
             ui.label(name.replace("_", " ")).classes("studio-subtitle").props["title"] = inner.doc
             with ui.element("div").classes("studio-inner"):
                 if inner.kind == "sections":
-                    self._table((*place, name), inner_bare)
+                    self._table((*place, name), inner.section)
                 else:
-                    self._section((*place, name), inner, inner_bare)
-        if rule.nullable:
+                    self._section((*place, name), inner, inner.section)
+        if rule is not None and rule.nullable:
             what = str(place[-1]).replace("_", " ")
             self._button(
                 f"Remove {what}", "delete",
@@ -112,12 +111,8 @@ class SchemaGroups:
 
     def _table(self, place: Place, bare: type) -> None:
         """Items in rows: what each must have in columns, all else behind a button."""
-        rules = rules_of(bare)
-        columns = {
-            name: rule
-            for name, (rule, _) in rules.items()
-            if rule.required and rule.kind not in ("section", "sections")
-        }
+        rules = settings_of(bare)
+        columns = {name: rule for name, rule in rules.items() if rule.required and not rule.section}
         widths = [
             "minmax(11rem, 3fr)" if in_parts(r) else "minmax(3.4rem, 0.8fr)"
             for r in columns.values()
@@ -138,7 +133,7 @@ class SchemaGroups:
         self._add_button(place, None, bare)
 
     def _item(
-        self, place: Place, bare: type, columns: Mapping[str, FieldRule], is_colored: bool
+        self, place: Place, bare: type, columns: Mapping[str, Setting], is_colored: bool
     ) -> None:
         number = place[-1]
         assert isinstance(number, int)
@@ -160,7 +155,7 @@ class SchemaGroups:
         problem.set_visibility(False)
         for name, rule, part in parts:
             with part:
-                self._form.cells(rule, (*place, name), tuple(rules_of(bare)), problem)
+                self._form.cells(rule, (*place, name), tuple(settings_of(bare)), problem)
 
     def _more(self, place: Place, bare: type) -> None:
         """A dialog with everything about one item."""
@@ -169,12 +164,12 @@ class SchemaGroups:
         )
         with ui.dialog() as dialog, ui.card().classes("studio-dialog"):
             ui.label(title.capitalize()).classes("studio-subtitle")
-            self._section(place, FieldRule("", "section"), bare)
+            self._section(place, None, bare)
             ui.button("Close", on_click=dialog.close).props("flat no-caps")
         dialog.on_value_change(lambda: None if dialog.value else dialog.delete())
         dialog.open()
 
-    def _add_button(self, place: Place, rule: FieldRule | None, bare: type) -> None:
+    def _add_button(self, place: Place, rule: Setting | None, bare: type) -> None:
         name = str(place[-1]).replace("_", " ")
         name = name.removesuffix("s") if rule is None else name
         with ui.row().classes("items-center"):
@@ -227,12 +222,12 @@ class SchemaGroups:
         made.props(f'aria-label="{words}" title="{words}"')
 
 
-def _required(schema: type, place: tuple[str, ...] = ()) -> dict[tuple[str, ...], FieldRule]:
+def _required(schema: type, place: tuple[str, ...] = ()) -> dict[tuple[str, ...], Setting]:
     """Fields that a section must have, also in the sections that it must have."""
-    found: dict[tuple[str, ...], FieldRule] = {}
-    for name, (rule, bare) in rules_of(schema).items():
+    found: dict[tuple[str, ...], Setting] = {}
+    for name, rule in settings_of(schema).items():
         if rule.required and rule.kind == "section":
-            found |= _required(bare, (*place, name))
+            found |= _required(rule.section, (*place, name))
         elif rule.required and rule.kind != "sections":
             found[(*place, name)] = rule
     return found
@@ -247,10 +242,10 @@ def _layout(schema: type, value: Any) -> Any:
     if value is None:
         return None
     found: dict[str, Any] = {}
-    for name, (rule, bare) in rules_of(schema).items():
+    for name, rule in settings_of(schema).items():
         inner = getattr(value, name)
         if rule.kind == "section":
-            found[name] = _layout(bare, inner)
+            found[name] = _layout(rule.section, inner)
         elif rule.kind == "sections":
-            found[name] = [_layout(bare, item) for item in inner]
+            found[name] = [_layout(rule.section, item) for item in inner]
     return found

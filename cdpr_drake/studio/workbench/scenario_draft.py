@@ -16,9 +16,8 @@ import yaml
 import cdpr_drake
 from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, DataFileError, ScenarioError
-from cdpr_drake.schema.fields import FieldRule
-from cdpr_drake.schema.typed_yaml import rules_of
-from cdpr_drake.schema.yaml_files import plain_values
+from cdpr_drake.schema.declarations import Setting, settings_of
+from cdpr_drake.schema.typed_yaml import plain_values
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import check_moves_robot
 
@@ -49,7 +48,7 @@ class FormField:
     """
 
     key: str
-    rule: FieldRule
+    rule: Setting
     text: str
 
 
@@ -203,12 +202,12 @@ class ScenarioDraft:
 def _section(schema: type, values: dict[str, Any], key: str, doc: str) -> FormSection:
     fields: list[FormField] = []
     sections: list[FormSection] = []
-    for name, (rule, bare) in rules_of(schema).items():
+    for name, rule in settings_of(schema).items():
         full, value = f"{key}.{name}" if key else name, values.get(name)
         if not key and name in FIXED:
             continue
         if rule.kind == "section" and isinstance(value, dict):
-            sections.append(_section(bare, value, full, rule.doc))
+            sections.append(_section(rule.section, value, full, rule.doc))
         else:
             fields.append(FormField(full, rule, _text(value)))
     return FormSection(key, doc, tuple(fields), tuple(sections))

@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.typed_yaml import rules_of
+from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
 from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 
@@ -69,17 +69,17 @@ def _pairs(one: Mapping[str, Value], other: Mapping[str, Value]) -> list[Pair]:
 
 def _fields(schema: type, value: Any, before: str) -> Iterator[tuple[str, Value]]:
     """Fields of a typed document, with units and axes."""
-    for name, (rule, bare) in rules_of(schema).items():
+    for name, rule in settings_of(schema).items():
         inner = getattr(value, name)
         words = f"{before} {name.replace('_', ' ')}".strip()
         unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
         if inner is None:
             continue
         if rule.kind == "section":
-            yield from _fields(bare, inner, words)
+            yield from _fields(rule.section, inner, words)
         elif rule.kind == "sections":
             for k, item in enumerate(inner):
-                yield from _fields(bare, item, f"{words} {k + 1}")
+                yield from _fields(rule.section, item, f"{words} {k + 1}")
         elif rule.kind == "array":
             flat = np.ravel(inner)
             axes = AXES if np.shape(inner) == (3,) else [str(k + 1) for k in range(len(flat))]

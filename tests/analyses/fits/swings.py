@@ -12,7 +12,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
@@ -24,6 +23,7 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import HysteresisSettings
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings
 
@@ -90,7 +90,7 @@ def believed_file(folder):
     """The robot as it is believed, on softer cables, as a file that commands take."""
     softer = replace(BELIEVED, cable=replace(BELIEVED.cable, youngs_modulus=SOFTER))
     path = folder / "believed.yaml"
-    path.write_text(yaml_dump_typed(softer), encoding="utf-8")
+    path.write_text(dump_typed(softer), encoding="utf-8")
     return str(path)
 
 

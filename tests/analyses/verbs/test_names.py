@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.common.yaml import yaml_dump_typed
 from pydrake.math import RigidTransform
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.frame.result import Result
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.summaries import Summarized
 from tests.analyses.verbs.verb_checks import HOMES, RESULTS, as_json, one_line, shows_itself
 
@@ -75,7 +75,7 @@ def test_the_import_is_light():
 
 def test_a_robot_by_name_path_and_itself(planar, tmp_path):
     path = tmp_path / "mine.yaml"
-    path.write_text(yaml_dump_typed(planar))
+    path.write_text(dump_typed(planar))
     told = [as_json(cdpr.solve_tensions(one)) for one in ("planar", str(path), path, planar)]
     assert told[1:] == told[:1] * 3
     one_line(lambda: cdpr.solve_tensions("planer"), "'planer'", "planar")

@@ -2,8 +2,9 @@
 
 import json
 import re
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.robot_exchange import export_robot
 from cdpr_drake.models.robot_exports import EXPORTS, HELD, export_omissions
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.fields import text
+from cdpr_drake.schema.declarations import Text, settings
 from tests.messages import printed
 from tests.models.formats.meanings import fields_that_differ, schema_keys
 from tests.models.formats.unusual_robots import (
@@ -128,11 +129,11 @@ def test_formats_hold_fields_and_the_guide_says_which():
     assert found == HELD
 
 
-@dataclass(kw_only=True)
+@settings
 class LaterRobot(Robot):
     """A robot of a schema that has grown."""
 
-    colour: str = text("Its colour.", "")
+    colour: Annotated[Text, "Its colour."] = ""
 
 
 def test_a_field_that_is_added_later_is_named():

@@ -126,7 +126,7 @@ REFUSED = {
         ("estimator.kind=eye_to_hand", "estimator.platform_tag: found none"),
         ("estimator={platform_tag: {mount: onboard, tag_id: 5, size: 0.12, pose: "
          "{position: [0, -0.1, 0.06], angles_deg: [55, 0, 0]}}}",
-         "estimator.platform_tag.mount: 'onboard' is not in the world"),
+         "estimator.platform_tag.mount: found 'onboard', which is not in the world"),
         ("pose_plan={}; trajectory={}", "trajectory: found a section with pose_plan"),
         ("pose_plan={}; controller.free_rotation=true",
          "controller.free_rotation: found true with pose_plan"),
@@ -135,7 +135,10 @@ REFUSED = {
 }  # fmt: skip
 """By scenario: changes and what is said of them."""
 
-FAULTS = {MOVING: 2, "robot=planar": 3}
+FAULTS = {
+    MOVING: 2, "robot=planar": 3, "tension_management={kind: by_length}": 3,
+    "tension_management={kind: by_length, highest: [-3], shortest: 1, longest: 2}": 2,
+}  # fmt: skip
 """Changes with several faults, one a line."""
 
 
@@ -183,7 +186,7 @@ ROBOTS = {
     "lens": (lens, SLACK_START, ["camera.kind=rendered", "tension_management={kind: image}"],
         ["sight_mount: found overview, whose lens distorts"]),
     "three winches": (lambda _: parallelograms(), PBVS, [PROJECTED, "tension_management={}"],
-        ["with 3 winches for 6 cables; accepted for a visual servo: at least 6",
+        ["with 3 winches for 6 cables; accepted: at least 6",
          "tension_management: found a section, which takes up slack cable by cable"]),
     "tensions of one winch": (lambda _: doubled(), "acrobot_computed_torque", [],
         ["which cannot be given tensions one by one"]),
@@ -208,7 +211,7 @@ def test_torque_without_motor_inertia_is_refused(tmp_path, capsys):
         main(["simulate", TORQUE, "--set", f"robot={robot}"])
     assert ended.value.code == 2
     message = printed(capsys).err
-    assert "winches.kind: found motor" in message
+    assert "winches.kind: robot acrobot_large" in message
     assert "winch.inertia" in message
 
 

@@ -30,6 +30,7 @@ from cdpr_drake.errors import (
 from cdpr_drake.models.robot_holding import check_bundles
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.models.ups_robot import add_ups_robot, rod_masses
+from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.robots.assembly import add_cable_robot
@@ -197,7 +198,8 @@ NAMED_BLOCKS = {
 
 
 def pushes(second):
-    DisturbanceSettings(pushes=[Push(kind="step", force=ONES), second]).check()
+    settings = DisturbanceSettings(pushes=[Push(kind="step", force=ONES), second])
+    refuse(settings, "disturbances", error=ScenarioError)
 
 
 def overridden(scenario, override):
@@ -205,11 +207,14 @@ def overridden(scenario, override):
 
 
 HAS = Equipment(8, 7, motors=False, sensors=("tension", "tracker"))
+"""What may fail of the robot in `EVENTS`."""
 
 
 def fails(second):
     first = Failure(kind="cable_breaks", time=0.0, cable=1)
-    FailureSettings(events=[first, second]).check(HAS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Equipment, "of", lambda scenario, robot: HAS)
+        refuse(FailureSettings(events=[first, second]), "failures", error=ScenarioError)
 
 
 PUSH, EVENT = r"disturbances\.pushes\[1\]\.", r"failures\.events\[1\]\."
@@ -287,12 +292,12 @@ GEOMETRY = {
 }  # fmt: skip
 
 PUSHES = {
-    "force: found no force and no moment; accepted with step": Push(kind="step"),
-    "end: found none; accepted with push": Push(kind="push", force=ONES),
+    "force: found no force and no moment; accepted: a force, a moment, or both, with step": Push(kind="step"),
+    "end: found none; accepted: one, with push": Push(kind="push", force=ONES),
     "frequency: found none": Push(kind="sine", force=ONES),
     "mass: found none": Push(kind="payload"),
     "mass: found 0": Push(kind="payload", mass=0.0),
-    "force: found one; accepted with pay": Push(kind="payload", mass=1.0, force=ONES),
+    "force: found one; accepted: none, with pay": Push(kind="payload", mass=1.0, force=ONES),
     "mass: found one with step": Push(kind="step", force=ONES, mass=1.0),
     "end: found 1 s": Push(kind="step", force=ONES, start=2.0, end=1.0),
     "wind: found none": Push(kind="wind", wind=np.zeros(3), drag_area=1.0),
@@ -325,7 +330,10 @@ OVERRIDES = {
         ("acrobot_broken_cable", "failures.events=[{kind: cable_thaws, time: 1.0, cable: 1}]"),
 }  # fmt: skip
 SCENARIOS = {
-    "no push": (lambda: DisturbanceSettings(pushes=[]).check(), "pushes: found none"),
+    "no push": (
+        lambda: refuse(DisturbanceSettings(pushes=[]), error=ScenarioError),
+        "pushes: found none",
+    ),
     **{words: (lambda push=push: pushes(push), PUSH + words) for words, push in PUSHES.items()},
     **{words: (lambda event=event: fails(event), EVENT + words) for words, event in EVENTS.items()},
     **{words: (lambda case=case: overridden(*case), words) for words, case in OVERRIDES.items()},
@@ -420,5 +428,5 @@ def test_a_scenario_refuses_what_its_robot_file_lacks(tmp_path):
     without = content_of()
     del without["winch"]["inertia"]
     (tmp_path / "robot.yaml").write_text(yaml.safe_dump(without))
-    with pytest.raises(ScenarioError, match=r"winches\.kind: found motor; robot acrobot_small: w"):
+    with pytest.raises(ScenarioError, match=r"winches\.kind: robot acrobot_small: w"):
         load_scenario("acrobot_friction", [override])

@@ -134,15 +134,15 @@ def ball(motion):
 
 
 BODIES = {
-    "size: found null; accepted for kind box": "{name: a, kind: box}",
+    "size: found null; accepted: a value, for kind box": "{name: a, kind: box}",
     "size: found one of a sphere": "{name: a, kind: sphere, size: [1, 1, 1]}",
     "radius: found -1; accepted: a number >= 0.0001": "{name: a, kind: sphere, radius: -1}",
-    r"motion.joint.point: found \[0.0, 0.0, 2000.0\]; accepted: within 1000 m": ball(
+    r"motion.joint.point\[2\]: found 2e3; accepted: 3 numbers >= -1000 and <= 1000 \[m\]": ball(
         "joint: {point: [0, 0, 2e3], axis: [0, 0, 1]}"
     ),
     "kind: found cone; accepted: one of box, cylinder": "{name: a, kind: cone}",
     "name: found target; accepted: not one of": "{name: target, kind: sphere, radius: 0.1}",
-    "name: found ground twice": "{name: ground, kind: sphere, radius: 0.1}",
+    "name: found ground; accepted: not one of": "{name: ground, kind: sphere, radius: 0.1}",
     r"obstacles\[0\].file: .*no.obj: there is no such": "{name: a, kind: mesh, file: no.obj}",
     "accepted: a file .obj or .gltf": "{name: a, kind: mesh, file: no.stl}",
     "motion: found a velocity and a joint; accepted: one of them": ball(
@@ -155,7 +155,9 @@ BODIES = {
     "repeat: found true, but the last waypoint": ball(
         "repeat: true, waypoints: [{time: 2, pose: {position: [1, 0, 0]}}]"
     ),
-    "joint.axis: found zeros": ball("joint: {point: [0, 0, 0], axis: [0, 0, 0]}"),
+    r"joint.axis: found \[0, 0, 0\]; accepted: 3 numbers, not all zero": ball(
+        "joint: {point: [0, 0, 0], axis: [0, 0, 0]}"
+    ),
     "starts 400 mm deep in a": "{name: a, kind: sphere, radius: 0.4}",
 }
 """Words of the refusal, and a body that has no place of its own."""
