@@ -17,10 +17,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import FreeMotionTask, FreeSigmas, fit_free_motion
+from cdpr_drake.analyses.fits.swings import swing_log, swinging_robot
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.identification.swings import SwingSigmas, SwingTask, fit_swings
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import HysteresisSettings
@@ -136,7 +137,7 @@ def write(path, runs=(0, 1), lengths=None):
 # Swings that tell behaviours of cables, of which many seeds are counted.
 
 COUNT, RATE = 60, 50.0
-NOISE = FreeSigmas(turn=0.002, position=0.001, tension=0.5)
+NOISE = SwingSigmas(turn=0.002, position=0.001, tension=0.5)
 TURNING = np.array([1.5, -1.0, 2.5])
 """Angular velocity of the push [rad/s]."""
 
@@ -198,8 +199,10 @@ def noisy(poses, tensions, random):
 def fitted(robot, unknown, log):
     """A fit of the whole log."""
     whole = ((0.0, (COUNT - 1) / RATE),)
-    task = FreeMotionTask(robot=robot, unknown=unknown, stretches=whole, sigmas=NOISE, start=START)
-    return fit_free_motion(task, log)
+    task = SwingTask(
+        robot=swinging_robot(robot), unknown=unknown, stretches=whole, sigmas=NOISE, start=START
+    )
+    return fit_swings(task, swing_log(robot, log))
 
 
 def identified(group, seed):

@@ -1,8 +1,8 @@
-"""What pulls at a platform beside its cables and its weight, by its momentum.
+"""What pulls at a platform in addition to its cables and its weight, by its momentum.
 
-Newton's and Euler's laws with measured turns, tensions and positions; positions are those that
-turns and cable lengths give, where no tracker tells them. Nothing is predicted, so that a hand at
-the platform shows at the instant at which it pulls, while a prediction is off from there on.
+Newton's and Euler's laws with measured turns, tensions and positions; without a tracker, turns and
+cable lengths give positions. Nothing is predicted, so that a hand at the platform shows at the
+instant at which it pulls, while a prediction is off from there on.
 """
 
 from __future__ import annotations
@@ -13,17 +13,11 @@ import numpy as np
 from scipy.signal import savgol_filter
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion_model import FreeMotionModel
-from cdpr_drake.analyses.calibration.free_motion_samples import Stretch
-from cdpr_drake.analyses.calibration.free_motion_sensor import (
-    places_by_lengths,
-    unsensed,
-    unsensed_tensions,
-)
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
-from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.poses import pose_from_row
+from cdpr_drake.identification.swing_log import Stretch
+from cdpr_drake.identification.swing_model import SwingModel
+from cdpr_drake.identification.swing_states import paths_of, places_by_lengths, pose_rows_of
 
 SMOOTH, ORDER = 0.18, 4
 """Span [s] and order of the polynomials that smooth and differentiate: up to some 8 Hz."""
@@ -68,9 +62,9 @@ class Unexplained:
 
 
 def unexplained(
-    model: FreeMotionModel, vector: Array, stretch: Stretch, places: Array
+    model: SwingModel, vector: Array, stretch: Stretch, places: Array
 ) -> Unexplained | None:
-    """What pulls beside cables and weight.
+    """What pulls in addition to cables and weight.
 
     Args:
         model: The robot.
@@ -79,53 +73,47 @@ def unexplained(
         places: Near positions of Po at its instants, shape (n, 3) [m].
 
     Returns:
-        None where it is not told: some tensions or turns are missing, or positions.
+        None if some tensions, turns or positions are missing, or the stretch is too short.
     """
-    window = 2 * round(0.5 * SMOOTH / stretch.step) + 1
+    step, log = stretch.step, stretch.log
+    window = 2 * round(0.5 * SMOOTH / step) + 1
     if window <= ORDER or stretch.count <= 2 * window or not np.isfinite(stretch.tensions).all():
         return None
     if not np.all(stretch.known > 0.0):
         return None
-    at = np.minimum(stretch.time + model.by_name(vector)["sensor.late"], stretch.recorded.time[-1])
-    turns, p = unsensed(
-        model, vector, stretch.recorded.turns_at(at), stretch.recorded.positions_at(at)
-    )
-    pulls = unsensed_tensions(model, vector, stretch.tensions)
+    at = np.minimum(stretch.time + model.by_name(vector)["sensor.late"], log.turn_time[-1])
+    turns, p = model.unsensed(vector, log.turns_at(at), log.positions_at(at))
+    pulls = model.unsensed_tensions(vector, stretch.tensions)
     if p is None:
         p = places_by_lengths(model, vector, turns, pulls, places)
     if not np.isfinite(p).all():
         return None
 
     def smooth(rows: Array, derivative: int) -> Array:
-        return np.asarray(
-            savgol_filter(rows, window, ORDER, deriv=derivative, delta=stretch.step, axis=0)
-        )
+        return np.asarray(savgol_filter(rows, window, ORDER, deriv=derivative, delta=step, axis=0))
 
-    platform, cables = model.platform(vector), model.cables
+    platform = model.platform(vector)
     R, c, mass = turns.as_matrix(), platform.p_PCo, platform.mass
     arms = R @ c
-    wrench = np.empty((stretch.count, 6))  # of the cables about the centre of mass
-    quaternions = turns.as_quat()[:, [3, 0, 1, 2]]
+    force, moment = np.empty_like(arms), np.empty_like(arms)  # of cables about the centre of mass
     try:
-        for k in range(stretch.count):
-            J = cable_paths(pose_from_row(np.concatenate([quaternions[k], p[k]])), cables).J
-            about_Po = -J.T @ pulls[k]
-            wrench[k, 3:] = about_Po[3:]
-            wrench[k, :3] = about_Po[:3] - np.cross(arms[k], about_Po[3:])
+        for k, row in enumerate(pose_rows_of(turns, p)):
+            about_Po = -paths_of(model, row).J.T @ pulls[k]
+            force[k] = about_Po[3:]
+            moment[k] = about_Po[:3] - np.cross(arms[k], about_Po[3:])
     except CableGeometryError:
         return None
-    weight = mass * model.robot.gravity_vector()
-    force = mass * smooth(p + arms, 2) - smooth(wrench[:, 3:], 0) - weight
+    force = mass * smooth(p + arms, 2) - smooth(force, 0) - mass * platform.acceleration()
     I_central = platform.I_PPo + mass * (np.outer(c, c) - float(c @ c) * np.eye(3))
-    momentum = R @ I_central @ np.swapaxes(R, 1, 2) @ _turning(turns, stretch.step)[:, :, None]
-    moment = smooth(momentum[:, :, 0], 1) - smooth(wrench[:, :3], 0)
+    momentum = R @ I_central @ np.swapaxes(R, 1, 2) @ _turning(turns, step)[:, :, None]
+    moment = smooth(momentum[:, :, 0], 1) - smooth(moment, 0)
     inner = slice(window // 2, -(window // 2))  # at the ends polynomials make noise of noise
     return Unexplained(stretch.time[inner], force[inner], moment[inner])
 
 
 def _turning(turns: Rotation, step: float) -> Array:
     """Angular velocities in W by central differences, shape (n, 3) [rad/s]."""
-    n, out = len(turns), np.empty((len(turns), 3))
+    n = len(turns)
     first, last = np.maximum(np.arange(n) - 1, 0), np.minimum(np.arange(n) + 1, n - 1)
-    out[:] = (turns[last] * turns[first].inv()).as_rotvec() / (step * (last - first))[:, None]
-    return out
+    turned = (turns[last] * turns[first].inv()).as_rotvec()
+    return np.asarray(turned / (step * (last - first))[:, None])
