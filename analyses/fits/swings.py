@@ -40,13 +40,12 @@ from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.identification.parameters import AXES, SIX
 from cdpr_drake.identification.swing_balance import PULL, PULLED
 from cdpr_drake.identification.swing_log import SwingLog
 from cdpr_drake.identification.swing_model import (
-    AXES,
     CREEP,
     HYSTERESIS,
-    SIX,
     STIFFENING,
     SwingingRobot,
 )

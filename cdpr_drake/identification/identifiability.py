@@ -32,13 +32,12 @@ def unidentifiable_words(
         H: Information along them, shape (f, f).
         terms: What was measured.
     """
-    parameters = layout.parameters()
-    typical = np.array([p[3] for p in parameters])
+    typical = np.array([p.size for p in layout.parameters])
     J = layout.jacobian(theta, layout.typical[:, None] * Z) / typical[:, None]
     back = np.linalg.inv(J)
     values, V = np.linalg.eigh(back.T @ H @ back)
     N = V[:, values < 1.0 / UNTOLD**2]
-    words = [p[1] for p in parameters]
+    words = [p.words for p in layout.parameters]
     why = _reason(terms)
     return tuple(named_direction(v, words) + why for v in sparse_basis(N).T)
 

@@ -110,9 +110,9 @@ class IdentificationResult:
     largest: tuple[Residual, ...]
     steps: int
     last_step: float
-    wall_time: float
     pose_error: float = 0.0
     remarks: tuple[str, ...] = ()
+    wall_time: float = 0.0
     program: ProgramReport | None = None
 
     @property

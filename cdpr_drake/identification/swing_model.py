@@ -29,10 +29,12 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
 from cdpr_drake.geometry.rotation_kernel import turn_pose
 from cdpr_drake.identification.parameters import (
+    AXES,
     CENTER,
     DAMPING,
     MASS_GROUP,
     MOMENTS,
+    SIX,
     STIFFNESS,
     DynamicModel,
 )
@@ -70,8 +72,6 @@ DECAY_OF_STEP = 1.5
 
 STIFFER = 2.0
 """The fastest mode may become so many times as fast in the search."""
-
-AXES, SIX = "xyz", ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

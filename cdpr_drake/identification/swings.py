@@ -21,12 +21,11 @@ from scipy.spatial.transform import Rotation
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError, IdentificationError
-from cdpr_drake.identification.parameters import MASS_GROUP
+from cdpr_drake.identification.parameters import AXES, MASS_GROUP
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR, OPTIMAL
 from cdpr_drake.identification.swing_balance import PULL, PULLED, Unexplained, unexplained
 from cdpr_drake.identification.swing_log import Stretch, SwingLog, cut, mean_pose, start_pose
 from cdpr_drake.identification.swing_model import (
-    AXES,
     FREE_GROUPS,
     SENSOR,
     START,

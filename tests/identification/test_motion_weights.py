@@ -9,10 +9,16 @@ from scipy.stats import chi2
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import rotation_from_vector
 from cdpr_drake.identification.correlated_noise import CorrelatedNoise
+from cdpr_drake.identification.equations import (
+    HUBER,
+    Equations,
+    huber_cost,
+    huber_limit,
+    huber_weights,
+)
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import inertia_regressor, regressor_slopes
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR
-from cdpr_drake.identification.robust_cost import HUBER, huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import (
     LEAST_POSE,
     LEAST_TENSION,
@@ -171,13 +177,13 @@ def test_the_residual_that_is_off_is_named():
 
 def test_an_end_that_is_worse_than_its_start_is_refused(monkeypatch):
     made = program(log(4, **NOISE), 4, believed(4), ("mass",))
-    ended = IdentificationProgram._least_squares
+    ended = Equations.least_squares
 
-    def light(self, *how):
-        fit = ended(self, *how)
-        return replace(fit, theta=1e-3 * fit.theta)
+    def light(self, terms, *how):
+        fit = ended(self, terms, *how)
+        return replace(fit, point=self.at(1e-3 * fit.point.theta, terms))
 
-    monkeypatch.setattr(IdentificationProgram, "_least_squares", light)
+    monkeypatch.setattr(Equations, "least_squares", light)
     with pytest.raises(IdentificationError, match=r"found parameters with chi-square .*no worse"):
         made.Solve()
 

@@ -37,7 +37,7 @@ def by_scipy(found, extra, constraints=()):
     """Half of chi-square with the weights at what was found, and an own cost, by another solver."""
     program = made()
     theta, typical = found.model.vector(), program.layout.typical
-    rows = program._rows(theta)
+    rows = program.equations.at(theta).rows
     A = np.vstack([r.A[:, :10] for r in rows])
     b = np.concatenate([r.b - r.A[:, 10:] @ (theta / typical)[10:] for r in rows])
 
