@@ -41,7 +41,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.identification.parameters import AXES, SIX
-from cdpr_drake.identification.swing_balance import PULL, PULLED
 from cdpr_drake.identification.swing_log import SwingLog
 from cdpr_drake.identification.swing_model import (
     CREEP,
@@ -49,8 +48,8 @@ from cdpr_drake.identification.swing_model import (
     STIFFENING,
     SwingingRobot,
 )
+from cdpr_drake.identification.swing_prediction import PULL, PULLED, PredictedStretch
 from cdpr_drake.identification.swings import (
-    PredictedStretch,
     SwingFit,
     SwingSigmas,
     SwingTask,

@@ -24,7 +24,6 @@ from cdpr_drake.identification.equations import (
     offs_of,
     scatter_of_blocks,
 )
-from cdpr_drake.identification.identifiability import unidentifiable_words
 from cdpr_drake.identification.motion_term import MotionTerm
 from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Form, Layout, offsets_needed
 from cdpr_drake.identification.physical_bounds import smooth_program, violated
@@ -38,6 +37,7 @@ from cdpr_drake.identification.result import (
 )
 from cdpr_drake.identification.samples import LoggedMotion, WinchSamples
 from cdpr_drake.identification.terms import CableTerm, Term, WinchTerm, prior_rows
+from cdpr_drake.numerics.null_directions import named_direction, sparse_basis
 from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues, is_convex
 
 BY_LIKELIHOOD = (
@@ -53,6 +53,13 @@ CONTRADICTED = (
 
 UNSETTLED, CONTRADICTION = 0.1, 4.0
 """Standard errors of the last step, and of priors, from which on a remark says so."""
+
+UNTOLD = 1.0
+"""A direction is told where its standard deviation is below this many typical sizes."""
+
+LITTLE_TURN = np.radians(2.0)
+LITTLE_ACCELERATION = 0.05
+"""Turns [rad] and accelerations, over gravity, that count as none."""
 
 
 class IdentificationProgram(OwnTerms):
@@ -172,7 +179,13 @@ class IdentificationProgram(OwnTerms):
         """What these measurements and priors cannot tell, in words, at the believed model."""
         told: list[Term] = [t.told() if isinstance(t, MotionTerm) else t for t in self.terms]
         theta, Z, H = self._information(told)
-        return unidentifiable_words(self.layout, theta, Z, H, self.terms)
+        parameters = self.layout.parameters
+        J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
+        back = np.linalg.inv(J / np.array([p.size for p in parameters])[:, None])
+        values, V = np.linalg.eigh(back.T @ H @ back)
+        N, why = V[:, values < 1.0 / UNTOLD**2], _reason(self.terms)
+        words = [p.words for p in parameters]
+        return tuple(named_direction(v, words) + why for v in sparse_basis(N).T)
 
     def FindCovariance(self) -> Array:
         """Covariance of the parameters by these measurements at the believed model, shape (f, f).
@@ -409,3 +422,19 @@ class IdentificationProgram(OwnTerms):
 def _positive(what: str, sigma: float) -> None:
     if not (np.isfinite(sigma) and sigma > 0.0):
         raise IdentificationError(f"{what}: sigma: found {sigma:g}; accepted: a finite number > 0")
+
+
+def _reason(terms: Sequence[Term]) -> str:
+    for term in terms:
+        if isinstance(term, MotionTerm):
+            s = term.samples
+            turned = np.einsum("ij,nij->n", s.R_WP[0], s.R_WP)
+            turn = float(np.max(np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))))
+            if turn < LITTLE_TURN:
+                return ": no rotation in the log"
+            gravity = max(float(np.linalg.norm(term.gravity)), 1.0)
+            fast = float(np.sqrt(np.mean(s.A_WP[:, 3:] ** 2))) / gravity
+            if fast < LITTLE_ACCELERATION:
+                return ": hardly any acceleration in the log"
+            return ""
+    return ""

@@ -119,9 +119,3 @@ class IdentificationResult:
     def std(self) -> Array:
         """Standard errors of the parameters, shape (f,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-    @property
-    def correlation(self) -> Array:
-        """Shape (f, f)."""
-        std = np.maximum(self.std, 1e-300)
-        return np.asarray(self.covariance / np.outer(std, std))

@@ -117,7 +117,7 @@ def sample_motion(
         if found != wanted:
             raise IdentificationError(f"{what}: found shape {found}; accepted: {wanted}")
     smoother = Smoother.over(time, bandwidth)
-    X = smoother.fit(_one_side(np.asarray(poses, float)))
+    X = smoother.fit(one_side(np.asarray(poses, float)))
     t = smoother.fit(np.asarray(tensions, float))
     at = smoother.sample_times()
     R, V, A, states = _motion(X, at)
@@ -217,7 +217,7 @@ def pose_shift(samples: LoggedMotion, cables: CableSet, gravity: Array) -> tuple
     return float(fine.x), max(misfit(0.0) / max(float(fine.fun), 1e-12), 1.0)
 
 
-def _one_side(poses: Array) -> Array:
+def one_side(poses: Array) -> Array:
     """Pose rows whose quaternions do not jump from q to -q, which is the same rotation."""
     rows = poses.copy()
     seen = np.flatnonzero(np.isfinite(rows).all(axis=1))

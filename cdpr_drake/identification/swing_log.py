@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError, IdentificationError
 from cdpr_drake.geometry.cable_paths import cable_paths
+from cdpr_drake.identification.samples import one_side
 from cdpr_drake.identification.swing_model import SwingingRobot
 
 RATE = 50.0
@@ -69,9 +70,7 @@ class SwingLog:
         rows = np.flatnonzero(np.isfinite(poses).all(axis=1))
         if len(rows) < 2:
             raise IdentificationError(f"{name}: turns: found {len(rows)} rows; accepted: 2 or more")
-        x = poses[rows]
-        inner = np.sum(x[1:, :4] * x[:-1, :4], axis=1)
-        x[1:, :4] *= np.cumprod(np.where(inner < 0.0, -1.0, 1.0))[:, None]
+        x = one_side(poses)[rows]
         # Sensors that are slower than the log repeat their rows: the first of them is the reading.
         new = np.concatenate([[True], np.any(x[1:] != x[:-1], axis=1)])
         return SwingLog(

@@ -23,7 +23,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import EquilibriumError, IdentificationError
 from cdpr_drake.identification.parameters import AXES, MASS_GROUP
 from cdpr_drake.identification.result import MISFIT, MISFIT_FACTOR, OPTIMAL
-from cdpr_drake.identification.swing_balance import PULL, PULLED, Unexplained, unexplained
 from cdpr_drake.identification.swing_log import Stretch, SwingLog, cut, mean_pose, start_pose
 from cdpr_drake.identification.swing_model import (
     FREE_GROUPS,
@@ -32,14 +31,9 @@ from cdpr_drake.identification.swing_model import (
     SwingingRobot,
     SwingModel,
     Unknown,
-    earlier,
 )
-from cdpr_drake.identification.swing_states import (
-    StartCoordinates,
-    first_state,
-    moved_sizes,
-    places_by_lengths,
-)
+from cdpr_drake.identification.swing_prediction import PredictedStretch, predicted, pulled
+from cdpr_drake.identification.swing_states import StartCoordinates, first_state, moved_sizes
 
 HORIZONS = ((0.6, 12), (1.5, 12), (1e9, 40))
 """So much of each stretch is fitted [s], with so many steps at most: first what belongs to sensors
@@ -106,59 +100,6 @@ class SwingTask:
     tracker: bool = False
     lead: float = 1.0
     priors: Mapping[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PredictedStretch:
-    """A stretch and its prediction.
-
-    Attributes:
-        stretch: What was measured.
-        lead: The first state is by so much of it [s]; infinite: it was fitted.
-        tensions: Predicted readings of load cells, shape (n, m) [N].
-        turned: Rotation vectors from predicted to measured turns, in the sensor's frame, shape
-            (n, 3) [rad].
-        measured_turns: Rotation vectors from the mean measured turn, shape (n, 3) [rad].
-        predicted_turns: The same of predicted readings.
-        positions: Measured in W, or where the measured turns and the cables' lengths put Po,
-            shape (n, 3) [m]; NaN where neither does.
-        places: Predictions of `positions`.
-        unexplained: What pulls in addition to cables and weight; None: it cannot be told.
-    """
-
-    stretch: Stretch
-    lead: float
-    tensions: Array
-    turned: Array
-    measured_turns: Array
-    predicted_turns: Array
-    positions: Array
-    places: Array
-    unexplained: Unexplained | None = None
-
-    def after_lead(self) -> np.typing.NDArray[np.bool_]:
-        """Instants that are predicted, or all, shape (n,)."""
-        time = self.stretch.time
-        if self.lead >= time[-1] - time[0]:
-            return np.ones(len(time), bool)
-        return np.asarray(time - time[0] > self.lead)
-
-    def turn_rms(self) -> float:
-        """Angle between predicted and measured turns, root mean square [rad]."""
-        rows = self.turned[self.after_lead() & (self.stretch.known > 0.0)]
-        return float(np.sqrt(np.mean(np.sum(rows**2, axis=1))))
-
-    def position_rms(self) -> float | None:
-        """Distance of predicted and measured positions, root mean square [m]."""
-        off = np.sum((self.places - self.positions) ** 2, axis=1)
-        rows = off[self.after_lead() & np.isfinite(off) & (self.stretch.known > 0.0)]
-        return float(np.sqrt(np.mean(rows))) if len(rows) else None
-
-    def tension_rms(self) -> float | None:
-        """Of all cables [N]."""
-        off = (self.tensions - self.stretch.tensions)[self.after_lead()]
-        off = off[np.isfinite(off)]
-        return float(np.sqrt(np.mean(off**2))) if off.size else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -254,15 +195,15 @@ def fit_swings(
     std = search.errors(solution, spread, together)
     say("held-out stretches")
     fitted = tuple(
-        _predicted(model, vector, s, x, np.inf) for s, x in zip(stretches, moved, strict=True)
+        predicted(model, vector, s, x, np.inf) for s, x in zip(stretches, moved, strict=True)
     )
     held_out = []
     for s in held:
         beginning = _Search(model, task.sigmas, [s.first(task.lead)], ~everything)
         x = first_state(model, vector, beginning.stretches[0])
         _, (x,), _ = beginning.solve(z, [x], HORIZONS[-1][1])
-        held_out.append(_predicted(model, vector, s, x, task.lead))
-    remarks = (*_remarks(model, std, spread, vector), *_pulled(model, vector, (*fitted, *held_out)))
+        held_out.append(predicted(model, vector, s, x, task.lead))
+    remarks = (*_remarks(model, std, spread, vector), *pulled(model, vector, (*fitted, *held_out)))
     if solution.status == 0:
         unsettled = (
             f"the search ended after {HORIZONS[-1][1]} steps before it settled: values may be off "
@@ -444,52 +385,6 @@ def _together(column: Array) -> float:
     below = np.flatnonzero(rho <= 0.0)
     last = int(below[0]) if len(below) else n
     return float(max(1.0 + 2.0 * np.sum(rho[1:last]), 1.0))
-
-
-def _predicted(
-    model: SwingModel, vector: Array, stretch: Stretch, moved: Array, lead: float
-) -> PredictedStretch:
-    states, tensions = model.run(vector, moved, stretch.count, stretch.step)
-    if not np.isfinite(states).all():
-        raise IdentificationError(
-            f"stretch from {stretch.time[0]:g} s: found no motion that goes on to its end"
-        )
-    turns, _ = model.sensed(vector, states, stretch.step)
-    _, places = earlier(states, stretch.step, model.by_name(vector)["sensor.late"])
-    measured = stretch.turns
-    R_WP, p = model.unsensed(vector, measured, stretch.positions)
-    if p is None:
-        pulls = model.unsensed_tensions(vector, stretch.tensions)
-        pulls = np.where(np.isfinite(pulls), pulls, tensions)
-        p = places_by_lengths(model, vector, R_WP, pulls, places)
-    middle = measured.mean().inv()
-    return PredictedStretch(
-        stretch=stretch, lead=lead, tensions=model.sensed_tensions(vector, tensions),
-        turned=(turns.inv() * measured).as_rotvec(), positions=p, places=places,
-        measured_turns=(middle * measured).as_rotvec(),
-        predicted_turns=(middle * turns).as_rotvec(),
-        unexplained=unexplained(model, vector, stretch, places),
-    )  # fmt: skip
-
-
-def _pulled(
-    model: SwingModel, vector: Array, stretches: Sequence[PredictedStretch]
-) -> tuple[str, ...]:
-    """Remarks on stretches in which something else than cables and weight pulls."""
-    platform = model.platform(vector)
-    weight = platform.mass * float(np.linalg.norm(platform.acceleration()))
-    remarks = []
-    for each in stretches:
-        if each.unexplained is None:
-            continue
-        force, at = each.unexplained.largest(each.unexplained.force)
-        if force > PULLED * weight:
-            time = each.stretch.time
-            remarks.append(
-                f"stretch {time[0]:.6g}:{time[-1]:.6g}: about {at:.4g} s neither cables nor weight "
-                f"explain {force:.3g} N, the mean over {PULL:g} s: a hand, or a wire?"
-            )
-    return tuple(remarks)
 
 
 def _modes(model: SwingModel, vector: Array) -> Array:

@@ -32,7 +32,7 @@ def noisy():
 def test_an_exact_log_gives_the_body_back():
     made = program(samples(span=4.0))
     found = made.Solve()
-    typical = np.array([p[3] for p in made.layout.parameters()])
+    typical = np.array([p.size for p in made.layout.parameters])
     off = (found.values - made.layout.values(TRUE.vector())) / typical
     assert np.max(np.abs(off)) < EXACT
     assert found.status == "optimal"
@@ -68,8 +68,8 @@ def test_what_no_body_has_is_not_found():
     rough = samples(turn=0.05, span=4.0, tension=3.0, place=1e-4, angle=2e-4)
     made = program(rough)
     made.AddPrior("inertia", 0.034)
-    free = made._least_squares(False)
-    assert np.linalg.eigvalsh(pseudo_inertia(free.theta[:10]))[0] < 0.0
+    free = made.equations.least_squares(made.terms, False)
+    assert np.linalg.eigvalsh(pseudo_inertia(free.point.theta[:10]))[0] < 0.0
     found = made.Solve(outliers=False)
     assert np.linalg.eigvalsh(pseudo_inertia(found.model.inertial()))[0] > -1e-7
     assert "pseudo-inertia" in found.active[0]

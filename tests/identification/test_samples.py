@@ -10,7 +10,7 @@ from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.identification.samples import (
     BLOCK,
-    _one_side,
+    one_side,
     pose_shift,
     sample_motion,
     sample_winches,
@@ -135,13 +135,13 @@ def test_quaternions_that_jump_to_the_other_side_are_the_same_motion(exact):
     poses[50] = np.nan
     of = sample_motion(time, poses, tensions, CABLES, BANDWIDTH)
     np.testing.assert_allclose(of.A_WP, exact.A_WP, atol=5e-3)
-    rows = _one_side(poses)
+    rows = one_side(poses)
     assert np.all(np.sum(rows[1:49, :4] * rows[:48, :4], axis=1) > 0.9)
     np.testing.assert_array_equal(rows[51, :4], log(span=4.0)[1][51, :4])
     np.testing.assert_array_equal(rows[:, 4:], poses[:, 4:])
     right = np.zeros((2, 7))  # a half turn apart: neither side is nearer, and nothing is lost
     right[0, 0] = right[1, 1] = 1.0
-    np.testing.assert_array_equal(_one_side(right), right)
+    np.testing.assert_array_equal(one_side(right), right)
 
 
 def late_by(rows, span=6.0, **how):

@@ -19,9 +19,9 @@ from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import IdentificationError, StoppedError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
-from cdpr_drake.identification.swing_balance import PULL, PULLED, unexplained
 from cdpr_drake.identification.swing_log import cut
 from cdpr_drake.identification.swing_model import FREE_GROUPS, SwingModel, earlier, usually_bent
+from cdpr_drake.identification.swing_prediction import PULL, PULLED, unexplained
 from cdpr_drake.identification.swing_states import StartCoordinates
 from cdpr_drake.identification.swings import SMALL, steps_within
 from cdpr_drake.models.robot_loader import load_robot
