@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
 from scipy.stats import chi2
 
 from cdpr_drake.errors import IdentificationError
-from cdpr_drake.geometry.poses import rotation_from_vector
+from cdpr_drake.geometry.cable_paths import cable_jacobian
+from cdpr_drake.geometry.poses import pose_row, rotation_from_vector
 from cdpr_drake.identification.equations import (
     HUBER,
     Equations,
@@ -185,24 +187,17 @@ def test_an_end_that_is_worse_than_its_start_is_refused(monkeypatch):
 
 
 def test_slopes_of_wrench_matrices_are_their_derivatives():
-    """Of straight cables, W = [B x u; u] with u from B to A, in closed form."""
-    case, state = 6, np.array([[0.9, 0.1, -0.2, 0.15, 0.1, -0.2, 0.3, 0, 0, 0, 0, 0, 0]])
-    state[:, :4] /= np.linalg.norm(state[:, :4])
-    w, x, y, z = state[0, :4]
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    R = np.eye(3) + 2.0 * w * cross + 2.0 * cross @ cross
-    B = R @ cables(case).p_PB
-    way = cables(case).p_WA - B - state[0, 4:7, None]
-    length = np.linalg.norm(way, axis=0)
-    u = way / length
-    found = wrench_matrix_slopes(state, cables(case))[0]
-    for k in range(6):
-        axis = np.eye(3)[k % 3]
-        dB = np.cross(axis, B.T).T if k < 3 else np.zeros_like(B)
-        moved = dB if k < 3 else np.outer(axis, np.ones(case))
-        du = -(moved - u * np.sum(u * moved, axis=0)) / length
-        expected = np.vstack([np.cross(dB.T, u.T).T + np.cross(B.T, du.T).T, du])
-        np.testing.assert_allclose(found[:, :, k], expected, atol=1e-8)
+    """By W = -J' of poses that are turned about, and moved along, the axes of W."""
+    X, h = RigidTransform(RollPitchYaw(0.2, -0.4, 0.3), [0.1, -0.2, 0.3]), 1e-5
+    found = wrench_matrix_slopes(np.append(pose_row(X), np.zeros(6))[None], cables(6))[0]
+
+    def at(turn, way):
+        moved = RigidTransform(rotation_from_vector(turn) @ X.rotation(), X.translation() + way)
+        return -cable_jacobian(moved, cables(6)).T
+
+    for k, step in enumerate(h * np.eye(6)):
+        slope = (at(step[:3], step[3:]) - at(-step[:3], -step[3:])) / (2.0 * h)
+        np.testing.assert_allclose(found[:, :, k], slope, atol=1e-8)
 
 
 def test_slopes_of_the_regressor_are_its_derivatives():

@@ -103,8 +103,7 @@ def test_a_held_out_swing_is_predicted(identified):
     assert one["turn_rms_rad"] < PREDICTED_TURN
     assert one["position_rms_m"] < PREDICTED_PLACE
     assert one["frequencies"]
-    for each in one["frequencies"]:
-        assert abs(each["off"]) < FREQUENCY_TOLERANCE
+    assert all(abs(each["off"]) < FREQUENCY_TOLERANCE for each in one["frequencies"])
     # The model as it was believed has other modes; what was found has the true ones.
     assert abs(said["modes_before_hz"][0] / said["modes_hz"][0] - 1.0) > 0.02
 
@@ -268,8 +267,7 @@ def test_scale_and_zeros_of_load_cells_are_found():
 
 def test_no_behaviour_is_unknown_unless_it_is_named():
     model = model_of(*FREE_GROUPS)
-    assert not {name for name in model.names if "hysteresis" in name or "creep" in name}
-    assert "all.stiffening" not in model.names
+    assert {u.group for u in model.unknowns} == {*FREE_GROUPS, "", "sensor"}
     assert model.first() == pytest.approx(np.zeros(len(model.names)))
 
 
@@ -305,10 +303,8 @@ def test_what_load_cells_tell_goes_back_to_tensions():
 
 
 def test_what_is_known_beforehand_weighs_and_counts():
-    known = model_of(*FREE_GROUPS).knowing({"mass": 0.1})
-    (mass,) = [one for one in known.unknowns if one.group == "mass"]
-    assert (mass.size, mass.known) == (0.1, True)
-    assert [one.known for one in known.unknowns].count(True) == 1
+    known = model_of(*FREE_GROUPS).knowing({"mass": 0.1}).unknowns
+    assert [(u.name, u.size) for u in known if u.known] == [("mass", 0.1)]
 
 
 def test_a_swing_tells_masses_and_forces_only_beside_what_load_cells_tell():
@@ -354,10 +350,25 @@ def pulls_on(model, vector, stretch):
     return unexplained(model, vector, stretch, np.tile(START.translation(), (stretch.count, 1)))
 
 
-def test_nothing_pulls_at_a_platform_that_swings_freely(free):
-    rest = pulls_on(*free[:3])
+@pytest.mark.parametrize("lengths", [False, True], ids=["tracker", "lengths"])
+def test_nothing_pulls_at_a_platform_that_swings_freely(free, lengths):
+    """Positions are a tracker's, or those by cable lengths."""
+    model, vector, stretch, log = free
+    if lengths:
+        model = model_of(*FREE_GROUPS, lengths=True)
+        turns = Rotation.from_quat(np.array([pose_row(X) for X in log.poses])[:, [1, 2, 3, 0]])
+        log = replace(log, poses=None, tilts=turns.as_euler("ZYX")[:, ::-1])
+        vector, stretch = model.before(), stretch_of(model, log)
+    rest = pulls_on(model, vector, stretch)
     assert rest.largest(rest.force)[0] < PULLED * WEIGHT
     assert rest.largest(rest.moment)[0] < PULLED * WEIGHT * 0.3
+    assert rest.time[-1] - rest.time[0] > PULL
+
+
+def test_another_mass_shows_as_its_weight(free):
+    model, vector, stretch, _ = free
+    rest = pulls_on(model, vector + (np.array(model.names) == "mass"), stretch)
+    assert rest.largest(rest.force)[0] == pytest.approx(9.80665, rel=0.3)  # and noise
 
 
 def test_a_hand_shows_when_it_pulls_and_how_much(free):
@@ -376,23 +387,6 @@ def test_a_hand_shows_when_it_pulls_and_how_much(free):
     np.testing.assert_allclose(np.mean(rest.force[middle], axis=0), by_cable[3:], atol=0.15 * HAND)
     moment = by_cable[:3] - np.cross(arm, by_cable[3:])
     np.testing.assert_allclose(np.mean(rest.moment[middle], axis=0), moment, atol=0.4)
-
-
-def test_another_mass_shows_as_its_weight(free):
-    model, vector, stretch, _ = free
-    heavier = vector + (np.array(model.names) == "mass")
-    rest = pulls_on(model, heavier, stretch)
-    assert rest.largest(rest.force)[0] == pytest.approx(9.80665, rel=0.3)  # and noise
-
-
-def test_positions_may_be_those_by_cable_lengths(free):
-    log = free[3]
-    alone = model_of(*FREE_GROUPS, lengths=True)
-    turns = Rotation.from_quat(np.array([pose_row(X) for X in log.poses])[:, [1, 2, 3, 0]])
-    tilted = replace(log, poses=None, tilts=turns.as_euler("ZYX")[:, ::-1])
-    rest = pulls_on(alone, alone.before(), stretch_of(alone, tilted))
-    assert rest.largest(rest.force)[0] < PULLED * WEIGHT
-    assert rest.time[-1] - rest.time[0] > PULL
 
 
 def test_it_is_unknown_without_all_tensions(free):
@@ -414,7 +408,9 @@ def test_it_is_unknown_without_all_tensions(free):
         ("--stretches 0:90", "stretch: found 0:90; accepted: 0.5 s or more within 0 to 2.39 s"),
         ("--unknown friction", "unknown: found 'friction'; accepted of a free"),
         ("--lead -1", "--lead: found -1; accepted: > 0 [s]"),
-        ("--prior turn=1", "--prior: found 'turn'; accepted: of what is"),
+        ("--prior turn=1", "--prior: found 'turn'; accepted: of what is unknown, mass"),
+        ("--prior mass=-1", "--prior: mass: found -1; accepted: > 0 [kg]"),
+        ("--unknown stiffness --prior mass=0.1", "found 'mass'; accepted: of what is unknown, st"),
         ("--sigma turns=1", "--sigma: found 'turns'; did you mean turn?"),
     ],
 )
@@ -424,19 +420,6 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
     said = refuse(capsys, "identify-swings", "irma4u", log, *options.split(), "--out", out)
     assert words in said
     assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("groups", "priors", "words"),
-    [
-        (FREE_GROUPS, {"masses": 1.0}, "priors: found 'masses'; accepted: of what is unknown, ma"),
-        (FREE_GROUPS, {"mass": -1.0}, r"priors: mass: found -1; accepted: > 0 \[kg\]"),
-        (("stiffness",), {"mass": 0.1}, "found 'mass'; accepted: of what is unknown, st"),
-    ],
-)
-def test_priors_of_what_is_not_unknown_are_refused(groups, priors, words):
-    with pytest.raises(IdentificationError, match=words):
-        model_of(*groups).knowing(priors)
 
 
 def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
