@@ -305,6 +305,8 @@ def test_what_load_cells_tell_goes_back_to_tensions():
 def test_what_is_known_beforehand_weighs_and_counts():
     known = model_of(*FREE_GROUPS).knowing({"mass": 0.1}).unknowns
     assert [(u.name, u.size) for u in known if u.known] == [("mass", 0.1)]
+    with pytest.raises(IdentificationError, match=r"priors: mass: found -1; accepted: > 0 \[kg\]"):
+        model_of(*FREE_GROUPS).knowing({"mass": -1.0})
 
 
 def test_a_swing_tells_masses_and_forces_only_beside_what_load_cells_tell():
@@ -409,7 +411,6 @@ def test_it_is_unknown_without_all_tensions(free):
         ("--unknown friction", "unknown: found 'friction'; accepted of a free"),
         ("--lead -1", "--lead: found -1; accepted: > 0 [s]"),
         ("--prior turn=1", "--prior: found 'turn'; accepted: of what is unknown, mass"),
-        ("--prior mass=-1", "--prior: mass: found -1; accepted: > 0 [kg]"),
         ("--unknown stiffness --prior mass=0.1", "found 'mass'; accepted: of what is unknown, st"),
         ("--sigma turns=1", "--sigma: found 'turns'; did you mean turn?"),
     ],
