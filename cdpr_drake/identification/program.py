@@ -134,7 +134,7 @@ class IdentificationProgram(OwnTerms):
         """Lengths that winches count, beside those that the poses have.
 
         Args:
-            samples: The motion.
+            samples: A motion.
             counted: Unstrained lengths at its samples, up to a constant, shape (s, m) [m].
             sigma: Their standard deviation, with what is wrong of the geometry [m].
             slack_below: Cables with less tension tell nothing [N].

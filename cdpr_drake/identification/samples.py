@@ -154,11 +154,7 @@ def wrench_matrices(states: Array, cables: CableSet) -> Array:
 
 
 def wrench_matrix_slopes(states: Array, cables: CableSet) -> Array:
-    """Derivatives of wrench matrices by turns about and ways along the axes of W.
-
-    Args:
-        states: Of the platform, shape (s, 13).
-        cables: The cables.
+    """Derivatives of `wrench_matrices` by turns about and ways along the axes of W.
 
     Returns:
         Shape (s, 6, m, 6) [1/rad, 1/m]; NaN: a cable cannot.
@@ -185,11 +181,6 @@ def pose_shift(samples: LoggedMotion, cables: CableSet, gravity: Array) -> tuple
 
     Inertial parameters are fitted for each shift that is tried, so that a wrong belief does not
     look like a wrong clock.
-
-    Args:
-        samples: The motion.
-        cables: The cables.
-        gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
 
     Returns:
         The shift [s], positive where poses are late, and the factor by which the root mean square

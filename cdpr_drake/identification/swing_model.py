@@ -79,12 +79,9 @@ class SwingingRobot:
     """A robot as it is believed, whose platform moves freely in space.
 
     Attributes:
-        name: Its name.
         dynamics: Names of the cables, mass, centre of mass and inertia.
-        platform: The platform; its inertia is about Po.
-        cables: The m cables.
         contacts: Friction against turns; slip counts where the stiffnesses are zero, too.
-        home: Its home pose X_WP.
+        home: Pose X_WP.
         size: Length scale of the platform [m].
     """
 
@@ -102,13 +99,10 @@ class Unknown:
     """One number of the unknown vector.
 
     Attributes:
-        name: Name in results.
-        unit: Its unit.
-        group: Its group; empty: always unknown.
+        group: Group; empty: always unknown.
         before: The belief.
         size: Usual distance from the belief; weighs as a prior of this standard deviation.
-        least: Lower bound.
-        most: Upper bound.
+        least, most: Bounds.
         first: Where the search begins; None: at the belief.
         known: True if the size is known beforehand, and counts in standard errors.
     """
@@ -131,7 +125,6 @@ class SwingModel:
     Attributes:
         robot: The belief.
         start: A pose near which it hangs.
-        unknowns: The unknown vector.
         step: Largest step of the method [s].
         fixed: Numbers that are not unknown, by name.
     """
@@ -151,8 +144,7 @@ class SwingModel:
         """With unknown groups.
 
         Args:
-            robot: The belief.
-            start: A pose near which it hangs.
+            robot, start: The attributes.
             groups: Names of `FREE_GROUPS` and `NAMED_GROUPS`.
             turns: True if a sensor tells turns alone, by an unknown heading and mount.
             tracker: True if a tracker's frame is unknown.

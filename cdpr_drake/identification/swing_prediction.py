@@ -121,10 +121,8 @@ def unexplained(
     """What pulls in addition to cables and weight.
 
     Args:
-        model: The robot.
-        vector: The unknown vector.
-        stretch: The stretch.
-        places: Near positions of Po at its instants, shape (n, 3) [m].
+        model, vector, stretch: The robot at its unknown vector, and what was measured.
+        places: Near positions of Po at the instants, shape (n, 3) [m].
 
     Returns:
         None if some tensions, turns or positions are missing, or the stretch is too short.

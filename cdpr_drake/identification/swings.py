@@ -77,14 +77,12 @@ class SwingTask:
     """What is identified of a log of free motion.
 
     Attributes:
-        robot: The belief.
         unknown: Groups of `FREE_GROUPS` and `NAMED_GROUPS`; None: all of the first that the log
             can tell.
         stretches: First and last instants of stretches to fit [s]; none: the first half of the
             log.
         held_out: The same of stretches to predict; none: the second half of the log, where
             stretches are not given either.
-        sigmas: Standard deviations.
         start: A pose near which the platform hangs; None: see `start_pose`.
         tracker: True if the frame of a tracker of poses is unknown; else it is W.
         lead: The first state of a held-out stretch is estimated from so much of it [s].
@@ -107,8 +105,6 @@ class SwingFit:
     """A robot's dynamics by a log of free motion.
 
     Attributes:
-        task: The task.
-        log: The log.
         status: `OPTIMAL`, or `MISFIT` where residuals are more than `MISFIT_FACTOR` sigmas.
         model: The robot as a function of the unknowns.
         values: The most likely unknowns, shape (f,).
@@ -119,7 +115,7 @@ class SwingFit:
         fitted: Stretches that were fitted.
         held_out: Stretches that were predicted.
         modes: Frequencies about rest, identified and believed, shapes (6,) [Hz].
-        steps: Of the search.
+        steps: Steps of the search.
         wall_time: [s].
         remarks: What should be known, in words.
     """
@@ -148,12 +144,7 @@ class SwingFit:
 def fit_swings(
     task: SwingTask, log: SwingLog, say: Callable[[str], object] = lambda _: None
 ) -> SwingFit:
-    """Finds a robot's dynamics in a log of free motion.
-
-    Args:
-        task: The task.
-        log: The log.
-        say: Called with a line on what is done now.
+    """Finds a robot's dynamics in a log of free motion; `say` gets a line on what is done now.
 
     Raises:
         IdentificationError: The log does not hold what is unknown, or no motion follows from it.
