@@ -189,9 +189,9 @@ def swing_log(robot: Robot, log: Measurements) -> SwingLog:
     if log.poses is not None:
         rows = np.array([np.full(7, np.nan) if X is None else pose_row(X) for X in log.poses])
     elif log.tilts is not None:
-        rows, told = np.full((log.count, 4), np.nan), np.isfinite(log.tilts).all(axis=1)
-        turns = Rotation.from_euler("ZYX", log.tilts[told][:, ::-1])
-        rows[told] = turns.as_quat()[:, [3, 0, 1, 2]]
+        rows, complete = np.full((log.count, 4), np.nan), np.isfinite(log.tilts).all(axis=1)
+        turns = Rotation.from_euler("ZYX", log.tilts[complete][:, ::-1])
+        rows[complete] = turns.as_quat()[:, [3, 0, 1, 2]]
     else:
         raise IdentificationError(
             f"{log.path}: turns: found none; accepted of a free motion: poses, or roll, pitch and "
@@ -393,9 +393,9 @@ def _turns_figure(motion: SwingFit, stretches: Sequence[PredictedStretch], title
     )  # fmt: skip
     grid = np.array(axes, dtype=object).reshape(3, count)
     for column, stretch in zip(grid.T, stretches, strict=True):
-        time, known = stretch.stretch.time, stretch.stretch.known > 0.0
+        time, covered = stretch.stretch.time, stretch.stretch.covered
         for k, panel in enumerate(column):
-            measured = np.where(known, np.degrees(stretch.measured_turns[:, k]), np.nan)
+            measured = np.where(covered, np.degrees(stretch.measured_turns[:, k]), np.nan)
             predicted = np.degrees(stretch.predicted_turns[:, k])
             panel.plot(time - time[0], measured, label="measured", **line_style(nth_look(0)))
             panel.plot(time - time[0], predicted, label="predicted", **line_style(nth_look(1)))

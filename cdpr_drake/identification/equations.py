@@ -136,8 +136,8 @@ class Equations:
     def at(self, theta: Array, terms: Sequence[Term] | None = None) -> Point:
         """Equations at a vector, of other terms if any are given."""
         typical = self.layout.typical
-        found = [term.rows(theta) for term in (self.terms if terms is None else terms)]
-        rows = [Rows(r.A * typical, r.b) for r in found]
+        tables = [term.rows(theta) for term in (self.terms if terms is None else terms)]
+        rows = [Rows(r.A * typical, r.b) for r in tables]
         A, b = np.zeros((len(self.priors), len(typical))), np.zeros(len(self.priors))
         for r, (entries, value, std) in enumerate(self.priors):
             for k, factor in entries.items():
@@ -146,7 +146,7 @@ class Equations:
         rows, x = [*rows, Rows(A, b)], theta / typical
         return Point(theta, x, rows, [r.A @ x - r.b for r in rows])
 
-    def known(self, theta: Array) -> tuple[Array, Array]:
+    def equalities(self, theta: Array) -> tuple[Array, Array]:
         """What is known of the vector over its typical sizes, with rows of length one."""
         E, e = self.layout.constraints(theta)
         E = E * self.layout.typical
@@ -155,12 +155,12 @@ class Equations:
 
     def directions(self, theta: Array) -> Array:
         """Orthonormal basis of what is free, shape (n, f)."""
-        E, _ = self.known(theta)
+        E, _ = self.equalities(theta)
         return np.asarray(null_space(E)) if len(E) else np.eye(len(theta))
 
     def program(self, point: Point, weights: Sequence[Array] | None = None) -> MathematicalProgram:
         """Equations at a point for Drake's solvers."""
-        return make_program(self.layout, point.normal(weights), self.known(point.theta))
+        return make_program(self.layout, point.normal(weights), self.equalities(point.theta))
 
     def weighed(self, outliers: bool) -> Fit:
         """Least squares with the error of poses where they are off by more than they jitter."""
@@ -192,20 +192,20 @@ class Equations:
             if outliers and step > 1:
                 limits = [*(huber_limit(rest) for rest in point.rests[:-1]), np.inf]
             weights = point.weights(limits)
-            (E, e), Z = self.known(point.theta), self.directions(point.theta)
-            known = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
+            (E, e), Z = self.equalities(point.theta), self.directions(point.theta)
+            fixed = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
             pairs = list(zip(point.rows, weights, strict=True))
             A = np.vstack([np.sqrt(w)[:, None] * r.A for r, w in pairs])
             b = np.concatenate([np.sqrt(w) * r.b for r, w in pairs])
-            y = np.linalg.lstsq(A @ Z, b - A @ known, rcond=None)[0]
-            way = (known + Z @ y) * typical - point.theta
+            y = np.linalg.lstsq(A @ Z, b - A @ fixed, rcond=None)[0]
+            way = (fixed + Z @ y) * typical - point.theta
             moved = float(np.max(np.abs(way / typical)))
             length = float(np.linalg.norm(A @ (way / typical)))
             cost = point.cost(limits)
             for k in range(MOST_HALVINGS):
-                there = self.at(point.theta + 0.5**k * way, terms)
-                if there.cost(limits) <= cost + point.indifferent(cost):
-                    point = there
+                trial = self.at(point.theta + 0.5**k * way, terms)
+                if trial.cost(limits) <= cost + point.indifferent(cost):
+                    point = trial
                     break
             else:
                 length = 0.0  # nothing along it is better
@@ -240,9 +240,9 @@ class Equations:
             x = way / layout.typical
             far = float(np.sqrt(max(float(x @ point.normal(weights)[0] @ x), 0.0)))
             for k in range(MOST_HALVINGS):
-                there = self.at(point.theta + 0.5**k * way, fit.terms)
-                if there.cost(limits) <= point.cost(limits):
-                    point = there
+                trial = self.at(point.theta + 0.5**k * way, fit.terms)
+                if trial.cost(limits) <= point.cost(limits):
+                    point = trial
                     break
             else:
                 break  # nothing along it is better
@@ -256,14 +256,14 @@ class Equations:
     def _solved(self, point: Point, weights: Sequence[Array]) -> tuple[Array, str]:
         """The solution of the program at a point, and its solver."""
         program = self.program(point, weights)
-        found = Solve(program)
-        if not found.is_success():
+        solution = Solve(program)
+        if not solution.is_success():
             raise IdentificationError(
-                f"identification: found {found.get_solution_result()} by "
-                f"{found.get_solver_id().name()}; accepted: data that some body can have"
+                f"identification: found {solution.get_solution_result()} by "
+                f"{solution.get_solver_id().name()}; accepted: data that some body can have"
             )
-        x = found.GetSolution(program.decision_variables())
-        return x * self.layout.typical, found.get_solver_id().name()
+        x = solution.GetSolution(program.decision_variables())
+        return x * self.layout.typical, solution.get_solver_id().name()
 
     def check_end(self, fit: Fit) -> None:
         """Refuses a solution that explains the measurements less well than the belief.

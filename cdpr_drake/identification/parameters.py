@@ -223,18 +223,16 @@ class Layout:
     def parameters(self) -> tuple[Parameter, ...]:
         """The free parameters."""
         model, L, m, one = self.model, self.size, self.model.mass, {-1: 1.0}
-        found = []
+        free = []
         if MASS_GROUP in self.unknown:
-            found.append(Parameter(MASS_GROUP, "mass", "kg", m, ({MASS: 1.0}, one)))
+            free.append(Parameter(MASS_GROUP, "mass", "kg", m, ({MASS: 1.0}, one)))
         if CENTER in self.unknown:
             for j, x in enumerate(AXES):
                 ratio = {1 + j: 1.0}, {MASS: 1.0}
-                found.append(Parameter(f"{CENTER}.{x}", f"centre of mass along {x}", "m", L, ratio))
+                free.append(Parameter(f"{CENTER}.{x}", f"centre of mass along {x}", "m", L, ratio))
         if MOMENTS in self.unknown:
             size = m * L * L
-            found += [
-                Parameter(f"{MOMENTS}.{x}", f"inertia {x}", "kg m^2", size, None) for x in SIX
-            ]
+            free += [Parameter(f"{MOMENTS}.{x}", f"inertia {x}", "kg m^2", size, None) for x in SIX]
         for group, word, words, unit, typical, above, below in (
             (STIFFNESS, "stiffness", "stiffness", "N", None, (), COMPLIANCE),
             (DAMPING, "retardation_time", "retardation time", "s", 1e-2, (LAG,), COMPLIANCE),
@@ -251,8 +249,8 @@ class Layout:
                         one if below is None else {column(i, below): 1.0},
                     )
                     name, label = f"{owner}.{word}", f"{owner}'s {words}"
-                    found.append(Parameter(name, label, unit, size, ratio))
-        return tuple(found)
+                    free.append(Parameter(name, label, unit, size, ratio))
+        return tuple(free)
 
     def values(self, theta: Array) -> Array:
         """The free parameters at a vector, shape (f,)."""

@@ -357,7 +357,7 @@ class IdentificationProgram(OwnTerms):
         program, (H, g, c) = self.prog(), point.normal(weights)
         cost = self._built_in_costs[0].evaluator()
         cost.UpdateCoefficients(H, -g, 0.5 * c, is_convex=True)
-        E, e = self.equations.known(point.theta)
+        E, e = self.equations.equalities(point.theta)
         if len(e):
             program.linear_equality_constraints()[0].evaluator().UpdateCoefficients(E, e)
         return H
@@ -380,12 +380,12 @@ class IdentificationProgram(OwnTerms):
         )
         rests, weights = point.rests, fit.weights
         if any(offs):  # as sensors are: weights are not those of the fit
-            known = self.equations.at(point.theta)
+            exact = self.equations.at(point.theta)
             limits = [
                 huber_limit(r) if np.isfinite(limit) else np.inf
-                for r, limit in zip(known.rests, fit.limits, strict=True)
+                for r, limit in zip(exact.rests, fit.limits, strict=True)
             ]
-            rests, weights = known.rests, known.weights(limits)
+            rests, weights = exact.rests, exact.weights(limits)
         fits, chi, count = {}, 0.0, 0
         for term, rest, w in zip(self.terms, rests[:-1], weights[:-1], strict=True):
             off, n = np.sqrt(w) * rest, len(rest)

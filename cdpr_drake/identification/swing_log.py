@@ -97,13 +97,13 @@ class Stretch:
     Attributes:
         time: Shape (n,) [s].
         log: The whole log.
-        known: 1 near a reading of turns, else 0, shape (n,).
+        covered: True near a reading of turns, shape (n,).
         tensions: Between rows, not means, which would damp them; shape (n, m) [N], NaN: none.
     """
 
     time: Array
     log: SwingLog
-    known: Array
+    covered: np.typing.NDArray[np.bool_]
     tensions: Array = field(repr=False)
 
     @property
@@ -129,7 +129,9 @@ class Stretch:
     def first(self, duration: float) -> Stretch:
         """The beginning of it."""
         n = max(min(self.count, round(duration / self.step) + 1), 2)
-        return replace(self, time=self.time[:n], known=self.known[:n], tensions=self.tensions[:n])
+        return replace(
+            self, time=self.time[:n], covered=self.covered[:n], tensions=self.tensions[:n]
+        )
 
 
 def cut(robot: SwingingRobot, log: SwingLog, spans: Sequence[tuple[float, float]]) -> list[Stretch]:
@@ -162,15 +164,15 @@ def cut(robot: SwingingRobot, log: SwingLog, spans: Sequence[tuple[float, float]
         t = start + np.arange(int((end - start) * rate) + 1) / rate
         after = np.searchsorted(log.turn_time, t).clip(1, len(log.turn_time) - 1)
         away = np.minimum(np.abs(log.turn_time[after] - t), np.abs(log.turn_time[after - 1] - t))
-        known = np.asarray(away < MISSED * usual, float)
-        if not known.any():
+        covered = away < MISSED * usual
+        if not covered.any():
             raise IdentificationError(f"{words}: found no turns in it; accepted: a part with some")
         tensions = np.full((len(t), m), np.nan)
         for i, column in enumerate([] if log.tensions is None else log.tensions.T):
             good = np.isfinite(column)
             if good.any():
                 tensions[:, i] = np.interp(t, time[good], column[good])
-        stretches.append(Stretch(time=t, log=log, known=known, tensions=tensions))
+        stretches.append(Stretch(time=t, log=log, covered=covered, tensions=tensions))
     return stretches
 
 

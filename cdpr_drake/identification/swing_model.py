@@ -104,7 +104,7 @@ class Unknown:
         size: Usual distance from the belief; weighs as a prior of this standard deviation.
         least, most: Bounds.
         first: Where the search begins; None: at the belief.
-        known: True if the size is known beforehand, and counts in standard errors.
+        prior: True if the size is known beforehand, and counts in standard errors.
     """
 
     name: str
@@ -115,7 +115,7 @@ class Unknown:
     least: float = -np.inf
     most: float = np.inf
     first: float | None = None
-    known: bool = False
+    prior: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +199,7 @@ class SwingModel:
                     f"priors: {group}: found {sigma:g}; accepted: > 0 [{PRIOR_UNITS[group]}]"
                 )
         unknowns = tuple(
-            replace(u, size=sigmas[u.group], known=True) if u.group in sigmas else u
+            replace(u, size=sigmas[u.group], prior=True) if u.group in sigmas else u
             for u in self.unknowns
         )
         return replace(self, unknowns=unknowns)

@@ -99,13 +99,13 @@ class PredictedStretch:
 
     def turn_rms(self) -> float:
         """Angle between predicted and measured turns, root mean square [rad]."""
-        rows = self.turned[self.after_lead() & (self.stretch.known > 0.0)]
+        rows = self.turned[self.after_lead() & self.stretch.covered]
         return float(np.sqrt(np.mean(np.sum(rows**2, axis=1))))
 
     def position_rms(self) -> float | None:
         """Distance of predicted and measured positions, root mean square [m]."""
         off = np.sum((self.places - self.positions) ** 2, axis=1)
-        rows = off[self.after_lead() & np.isfinite(off) & (self.stretch.known > 0.0)]
+        rows = off[self.after_lead() & np.isfinite(off) & self.stretch.covered]
         return float(np.sqrt(np.mean(rows))) if len(rows) else None
 
     def tension_rms(self) -> float | None:
@@ -131,7 +131,7 @@ def unexplained(
     window = 2 * round(0.5 * SMOOTH / step) + 1
     if window <= ORDER or stretch.count <= 2 * window or not np.isfinite(stretch.tensions).all():
         return None
-    if not np.all(stretch.known > 0.0):
+    if not stretch.covered.all():
         return None
     at = np.minimum(stretch.time + model.by_name(vector)["sensor.late"], log.turn_time[-1])
     turns, p = model.unsensed(vector, log.turns_at(at), log.positions_at(at))

@@ -274,7 +274,7 @@ class _Search:
         positions = stretch.positions
         if positions is not None:
             out[:, 3:6] = (positions - p) / self.sigmas.position
-        out[:, :6] *= stretch.known[:, None]
+        out[:, :6] *= stretch.covered[:, None]
         off = (stretch.tensions - model.sensed_tensions(vector, tensions)) / self.sigmas.tension
         out[:, 6:] = np.where(np.isfinite(off), off, 0.0)
         return np.clip(out, -LOST, LOST)
@@ -359,7 +359,7 @@ class _Search:
         J = solution.jac[: -n or None]  # without the priors of the unknowns
         information = J.T @ J / (max(spread, 1.0) ** 2 * together)
         information[n:, n:] += np.eye(len(information) - n) * 1e-6
-        beforehand = [1.0 if u.known else 1e-4 for u in self.model.unknowns]
+        beforehand = [1.0 if u.prior else 1e-4 for u in self.model.unknowns]
         whole = information + np.diag(np.r_[beforehand, np.zeros(len(information) - n)])
         variance = np.diag(np.linalg.pinv(whole, hermitian=True))[:n]
         std = self.model.sizes() * np.sqrt(np.maximum(variance, 0.0))

@@ -304,7 +304,7 @@ def test_what_load_cells_tell_goes_back_to_tensions():
 
 def test_what_is_known_beforehand_weighs_and_counts():
     known = model_of(*FREE_GROUPS).knowing({"mass": 0.1}).unknowns
-    assert [(u.name, u.size) for u in known if u.known] == [("mass", 0.1)]
+    assert [(u.name, u.size) for u in known if u.prior] == [("mass", 0.1)]
     with pytest.raises(IdentificationError, match=r"priors: mass: found -1; accepted: > 0 \[kg\]"):
         model_of(*FREE_GROUPS).knowing({"mass": -1.0})
 
