@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
+from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import (
-    FollowedStretch,
-    FreeMotion,
-    FreeMotionTask,
-    FreeSigmas,
-    fit_free_motion,
-)
-from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED
-from cdpr_drake.analyses.calibration.free_motion_model import CREEP, HYSTERESIS, STIFFENING
 from cdpr_drake.analyses.fits.fit import (
     Fit,
     Unknown,
@@ -43,13 +35,31 @@ from cdpr_drake.analyses.frame.words import (
     named_values,
     words,
 )
+from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
+from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.identification.parameters import AXES, SIX
+from cdpr_drake.identification.swing_log import SwingLog
+from cdpr_drake.identification.swing_model import (
+    CREEP,
+    HYSTERESIS,
+    STIFFENING,
+    SwingingRobot,
+)
+from cdpr_drake.identification.swing_prediction import PULL, PULLED, PredictedStretch
+from cdpr_drake.identification.swings import (
+    SwingFit,
+    SwingSigmas,
+    SwingTask,
+    fit_swings,
+)
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
+from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
-from cdpr_drake.models.robot_statics import as_pose
+from cdpr_drake.models.robot_statics import as_pose, rigid_platform
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -134,9 +144,9 @@ def identify_swings(
         raise IdentificationError(f"lead: found {lead:g}; accepted: > 0 [s]")
     deviations = _sigmas(sigmas or {})
     measured = log_of(loaded, log)
-    task = FreeMotionTask(
-        robot=loaded, stretches=tuple(stretches), held_out=tuple(hold_out), sigmas=deviations,
-        unknown=None if unknown is None else group_names(unknown),
+    task = SwingTask(
+        robot=swinging_robot(loaded), stretches=tuple(stretches), held_out=tuple(hold_out),
+        sigmas=deviations, unknown=None if unknown is None else group_names(unknown),
         start=None if start is None else as_pose(loaded, start), tracker=tracker_frame, lead=lead,
         priors=dict(priors or {}),
     )  # fmt: skip
@@ -149,26 +159,60 @@ def identify_swings(
 
     def work() -> Fit:
         follow.doing(f"Identifying {loaded.name}")
-        return swings_fit(fit_free_motion(task, measured, follow.doing))
+        return swings_fit(loaded, fit_swings(task, swing_log(loaded, measured), follow.doing))
 
     name = f"identify-swings-{loaded.name}"
     return kept_fit(name, arguments, work, folder, overwrite, formats, follow)
 
 
-def _sigmas(values: Mapping[str, float]) -> FreeSigmas:
-    names = [field.name for field in fields(FreeSigmas)]
+def swinging_robot(robot: Robot) -> SwingingRobot:
+    """A robot as the mathematics takes it.
+
+    Raises:
+        IdentificationError: Its platform does not move freely in space.
+    """
+    return SwingingRobot(
+        name=robot.name, dynamics=dynamic_model(robot), platform=rigid_platform(robot),
+        cables=robot.cable_set(), home=robot.home.transform(), size=platform_size(robot),
+        contacts=(robot.platform.hysteresis or HysteresisSettings()).contacts(),
+    )  # fmt: skip
+
+
+def swing_log(robot: Robot, log: Measurements) -> SwingLog:
+    """A robot's log as the mathematics takes it.
+
+    Raises:
+        IdentificationError: The log has no times, or neither poses nor turns.
+    """
+    if log.time is None:
+        raise IdentificationError(f"{log.path}: time: found none; accepted: a column time_s")
+    if log.poses is not None:
+        rows = np.array([np.full(7, np.nan) if X is None else pose_row(X) for X in log.poses])
+    elif log.tilts is not None:
+        rows, complete = np.full((log.count, 4), np.nan), np.isfinite(log.tilts).all(axis=1)
+        turns = Rotation.from_euler("ZYX", log.tilts[complete][:, ::-1])
+        rows[complete] = turns.as_quat()[:, [3, 0, 1, 2]]
+    else:
+        raise IdentificationError(
+            f"{log.path}: turns: found none; accepted of a free motion: poses, or roll, pitch and "
+            "yaw"
+        )
+    return SwingLog.of(str(log.path), log.time, rows, log.tensions, log.wound(robot))
+
+
+def _sigmas(values: Mapping[str, float]) -> SwingSigmas:
+    names = [field.name for field in fields(SwingSigmas)]
     for name, value in values.items():
         if name not in names:
             raise IdentificationError(f"sigmas: found {name!r}; {accepted_names(name, names)}")
         if not 0.0 < value < math.inf:
             raise IdentificationError(f"sigmas: {name}: found {value:g}; accepted: > 0")
-    return FreeSigmas(**values)
+    return SwingSigmas(**values)
 
 
-def swings_fit(motion: FreeMotion) -> Fit:
+def swings_fit(robot: Robot, motion: SwingFit) -> Fit:
     """The fit to a log of swings, with its robot, tables and figures."""
-    robot, task = motion.task.robot, motion.task
-    tracked = motion.fitted[0].stretch.recorded.positions is not None
+    task, tracked = motion.task, motion.log.positions is not None
     fitted, held_out = (
         [_stretch_numbers(stretch) for stretch in stretches]
         for stretches in (motion.fitted, motion.held_out)
@@ -185,10 +229,11 @@ def swings_fit(motion: FreeMotion) -> Fit:
     if any(each.unexplained is not None for each in (*motion.fitted, *motion.held_out)):
         drawings["unexplained"] = lambda: _unexplained_figure(motion)
     return Fit(
-        title=f"Free motion of {robot.name}", model=swung_robot(motion), status=motion.status,
-        unknowns=unknowns, spread=motion.spread, held_out=held_out, remarks=motion.remarks,
+        title=f"Free motion of {robot.name}", model=swung_robot(robot, motion),
+        status=motion.status, unknowns=unknowns, spread=motion.spread, held_out=held_out,
+        remarks=motion.remarks,
         details=finite({
-            "robot": robot.name, "log": str(motion.log.path), "method": "free motion",
+            "robot": robot.name, "log": motion.log.name, "method": "free motion",
             "correlation_instants": motion.correlation_time,
             "sigmas": {
                 "turn_rad": task.sigmas.turn, "position_m": task.sigmas.position,
@@ -226,7 +271,7 @@ def dominant_frequency(time: Array, values: Array) -> float:
     return float(frequencies[k] + shift * frequencies[1])
 
 
-def _axis_frequencies(stretch: FollowedStretch) -> list[dict[str, Any]]:
+def _axis_frequencies(stretch: PredictedStretch) -> list[dict[str, Any]]:
     """Measured and predicted frequencies of `LARGE` turns, behind the lead of a stretch."""
     rows = stretch.after_lead()
     time, sizes = stretch.stretch.time[rows], np.std(stretch.measured_turns[rows], axis=0)
@@ -241,7 +286,7 @@ def _axis_frequencies(stretch: FollowedStretch) -> list[dict[str, Any]]:
     return frequencies
 
 
-def _stretch_numbers(stretch: FollowedStretch) -> dict[str, Any]:
+def _stretch_numbers(stretch: PredictedStretch) -> dict[str, Any]:
     """Numbers of a stretch for JSON; `unexplained` is what neither cables nor weight explain."""
     time, rest, largest = stretch.stretch.time, stretch.unexplained, None
     if rest is not None:
@@ -259,7 +304,7 @@ def _stretch_numbers(stretch: FollowedStretch) -> dict[str, Any]:
 
 
 def _tables(
-    motion: FreeMotion, unknowns: Sequence[Unknown], fitted: Sequence[dict[str, Any]],
+    motion: SwingFit, unknowns: Sequence[Unknown], fitted: Sequence[dict[str, Any]],
     held_out: Sequence[dict[str, Any]],
 ) -> list[Table]:  # fmt: skip
     """Parameters, predictions of stretches, modes, remarks."""
@@ -300,14 +345,14 @@ def _tables(
     ]  # fmt: skip
 
 
-def swung_robot(motion: FreeMotion) -> Robot:
+def swung_robot(robot: Robot, motion: SwingFit) -> Robot:
     """The robot with its identified dynamics."""
-    robot, values = motion.task.robot, motion.model.by_name(motion.values)
+    values = motion.model.by_name(motion.values)
     groups = {unknown.group for unknown in motion.unknowns}
     platform = replace(
         robot.platform, mass=values["mass"],
-        center_of_mass=np.array([values[f"center_of_mass.{a}"] for a in "xyz"]),
-        inertia=np.array([values[f"inertia.{a}"] for a in ("xx", "yy", "zz", "xy", "xz", "yz")]),
+        center_of_mass=np.array([values[f"center_of_mass.{a}"] for a in AXES]),
+        inertia=np.array([values[f"inertia.{ab}"] for ab in SIX]),
     )  # fmt: skip
     if HYSTERESIS in groups:
         rubbing = HysteresisSettings(**{
@@ -336,7 +381,7 @@ def swung_robot(motion: FreeMotion) -> Robot:
     return fitted_robot(robot, done, motion.status, motion.unknowns, **changes)
 
 
-def _turns_figure(motion: FreeMotion, stretches: Sequence[FollowedStretch], title: str) -> Figure:
+def _turns_figure(motion: SwingFit, stretches: Sequence[PredictedStretch], title: str) -> Figure:
     """Turns about the sensor's axes, measured and predicted, a column a stretch."""
     from cdpr_drake.analyses.frame.figures import line_style, new_figure
     from cdpr_drake.palette import nth_look
@@ -348,9 +393,9 @@ def _turns_figure(motion: FreeMotion, stretches: Sequence[FollowedStretch], titl
     )  # fmt: skip
     grid = np.array(axes, dtype=object).reshape(3, count)
     for column, stretch in zip(grid.T, stretches, strict=True):
-        time, known = stretch.stretch.time, stretch.stretch.known > 0.0
+        time, covered = stretch.stretch.time, stretch.stretch.covered
         for k, panel in enumerate(column):
-            measured = np.where(known, np.degrees(stretch.measured_turns[:, k]), np.nan)
+            measured = np.where(covered, np.degrees(stretch.measured_turns[:, k]), np.nan)
             predicted = np.degrees(stretch.predicted_turns[:, k])
             panel.plot(time - time[0], measured, label="measured", **line_style(nth_look(0)))
             panel.plot(time - time[0], predicted, label="predicted", **line_style(nth_look(1)))
@@ -364,7 +409,7 @@ def _turns_figure(motion: FreeMotion, stretches: Sequence[FollowedStretch], titl
     return figure
 
 
-def _unexplained_figure(motion: FreeMotion) -> Figure:
+def _unexplained_figure(motion: SwingFit) -> Figure:
     """Forces that neither cables nor weight explain, a panel a stretch, and a remark's limit."""
     from cdpr_drake.analyses.frame.figures import few_ticks, line_style, new_figure
     from cdpr_drake.palette import BOUND, nth_look
@@ -374,8 +419,8 @@ def _unexplained_figure(motion: FreeMotion) -> Figure:
         for title, each in (("fitted", motion.fitted), ("held out", motion.held_out))
         for stretch in each if stretch.unexplained is not None
     ]  # fmt: skip
-    gravity = float(np.linalg.norm(motion.task.robot.gravity_vector()))
-    weight = motion.model.by_name(motion.values)["mass"] * gravity
+    platform = motion.model.platform(motion.values)
+    weight = platform.mass * float(np.linalg.norm(platform.acceleration()))
     figure, axes = new_figure(
         1, len(stretches), (max(9.0, 4.0 * len(stretches)), 4.4),
         f"Free motion of {motion.task.robot.name}: what neither cables nor weight explain",

@@ -4,7 +4,8 @@ The wrench that a motion of a rigid platform asks for is linear in ten inertial 
 are longer than their winches count by what tension makes of them; motors lose what neither tension
 nor acceleration explain. Each is an equation in one unknown vector. Logs are smoothed without phase
 up to a bandwidth, and all equations are weighted by the noise that this leaves, which follows from
-the log itself. `design_excitation` makes a motion that tells most.
+the log itself. `design_excitation` makes a motion that tells most. `fit_swings` predicts whole
+swings on standing winches instead, and needs neither positions nor winches.
 
 Frames and wrenches as in `geometry`; wrenches and accelerations are ordered (rotation,
 translation). Lengths count positive when paid out, as in `winches`.

@@ -99,14 +99,12 @@ class Excitation:
         score: Logarithm of the determinant of the information per time, in typical sizes.
         first_score: The same of the random poses from which the search started.
         condition: Condition number of the equations in typical sizes.
-        information: Per unit variance of tensions at `POINTS` a stretch, shape (10, 10).
     """
 
     trajectory: PoseTrajectory
     score: float
     first_score: float
     condition: float
-    information: Array
 
 
 def design_excitation(
@@ -156,7 +154,7 @@ def design_excitation(
                     poses[k], pieces = pose, tried
     H = np.asarray(sum(piece.information for piece in pieces))
     trajectory = PoseTrajectory(tuple(poses), tuple(p.duration for p in pieces), pause)
-    return Excitation(trajectory, _score(pieces), first, float(np.sqrt(np.linalg.cond(H))), H)
+    return Excitation(trajectory, _score(pieces), first, float(np.sqrt(np.linalg.cond(H))))
 
 
 @dataclass(frozen=True, eq=False)

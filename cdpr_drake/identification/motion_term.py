@@ -122,12 +122,8 @@ class MotionTerm:
         return Rows(A, np.concatenate(b))
 
     def with_errors_of_poses(self, theta: Array, bounded: bool) -> MotionTerm:
-        """The same with the error of poses that explains what a vector, shape (n,), leaves.
-
-        Args:
-            theta: The unknown vector.
-            bounded: True if residuals count as no more than `BOUNDED` sigmas.
-        """
+        """The same with the error of poses that explains what a vector, shape (n,), leaves;
+        `bounded`: residuals count as no more than `BOUNDED` sigmas."""
         most, usual = (BOUNDED, BOUNDED_SQUARE) if bounded else (np.inf, 1.0)
 
         def excess(log_off: float) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -36,7 +38,29 @@ winch counts [m], Coulomb friction [N m], static friction above it [N m], viscou
 
 PER_CABLE = 6
 
-_AXES, _SIX = "xyz", ("xx", "yy", "zz", "xy", "xz", "yz")
+AXES, SIX = "xyz", ("xx", "yy", "zz", "xy", "xz", "yz")
+
+Form: TypeAlias = dict[int, float]
+"""A linear form of the vector: factors by place, of a constant at -1."""
+
+
+class Parameter(NamedTuple):
+    """A free parameter as users read it.
+
+    Attributes:
+        name: Its name.
+        words: The same in words.
+        unit: Its unit.
+        size: By how much it is usually unknown.
+        ratio: One linear form of the vector over another; None: neither, a moment of inertia about
+            the centre of mass.
+    """
+
+    name: str
+    words: str
+    unit: str
+    size: float
+    ratio: tuple[Form, Form] | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,124 +185,86 @@ class Layout:
         Where inertia is known and the centre of mass is not, the inertia about Po is that with
         the centre of mass of `theta`.
         """
-        believed, size = self.model.vector(), len(theta)
-        rows: list[tuple[dict[int, float], float]] = []
-
-        def fix(k: int) -> None:
-            rows.append(({k: 1.0}, believed[k]))
-
-        if MASS_GROUP not in self.unknown:
-            fix(MASS)
-        if CENTER not in self.unknown:
-            for j in range(3):
-                rows.append(({1 + j: 1.0, MASS: -float(self.model.center_of_mass[j])}, 0.0))
-        if MOMENTS not in self.unknown:
-            c = theta[MOMENT] / theta[MASS]
-            if CENTER not in self.unknown:
-                c = self.model.center_of_mass
-            per_mass = about_center(1.0, c)
-            for j in range(6):
-                rows.append(({4 + j: 1.0, MASS: -per_mass[j]}, float(self.model.inertia[j])))
-        for i in range(len(self.model.names)):
-            rows += self._of_cable(i, believed)
-        E, e = np.zeros((len(rows), size)), np.zeros(len(rows))
+        model, unknown, believed = self.model, self.unknown, self.model.vector()
+        rows: list[tuple[Form, float]] = []
+        if MASS_GROUP not in unknown:
+            rows.append(({MASS: 1.0}, believed[MASS]))
+        if CENTER not in unknown:
+            rows += [({1 + j: 1.0, MASS: -c}, 0.0) for j, c in enumerate(model.center_of_mass)]
+        if MOMENTS not in unknown:
+            c = model.center_of_mass if CENTER not in unknown else theta[MOMENT] / theta[MASS]
+            each = zip(about_center(1.0, c), model.inertia, strict=True)
+            rows += [({4 + j: 1.0, MASS: -lever}, value) for j, (lever, value) in enumerate(each)]
+        of = {STIFFNESS: (COMPLIANCE,), FRICTION: (COULOMB, VISCOUS), STATIC: (EXCESS,)}
+        for i in range(len(model.names)):
+            for group, members in of.items():
+                for k, first in ((column(i, what), column(0, what)) for what in members):
+                    if group not in unknown:
+                        rows.append(({k: 1.0}, believed[k]))
+                    elif group in self.common and i > 0:
+                        rows.append(({k: 1.0, first: -1.0}, 0.0))
+            lag, flexible = column(i, LAG), column(i, COMPLIANCE)
+            if DAMPING not in unknown:
+                rows.append(({lag: 1.0, flexible: -float(model.retardation[i])}, 0.0))
+            elif DAMPING in self.common and i > 0:
+                share = float(model.stiffness[0] / model.stiffness[i])
+                rows.append(
+                    ({lag: 1.0, column(0, LAG): -1.0 if STIFFNESS in unknown else -share}, 0.0)
+                )
+            if not self.offsets:
+                rows.append(({column(i, OFFSET): 1.0}, believed[column(i, OFFSET)]))
+        E, e = np.zeros((len(rows), len(theta))), np.zeros(len(rows))
         for r, (entries, value) in enumerate(rows):
-            for k, factor in entries.items():
-                E[r, k] = factor
+            E[r, list(entries)] = list(entries.values())
             e[r] = value
         return E, e
 
-    def _of_cable(self, i: int, believed: Array) -> list[tuple[dict[int, float], float]]:
-        rows: list[tuple[dict[int, float], float]] = []
-        of = {STIFFNESS: (COMPLIANCE,), FRICTION: (COULOMB, VISCOUS), STATIC: (EXCESS,)}
-        for group, members in of.items():
-            for what in members:
-                k = column(i, what)
-                if group not in self.unknown:
-                    rows.append(({k: 1.0}, believed[k]))
-                elif group in self.common and i > 0:
-                    rows.append(({k: 1.0, column(0, what): -1.0}, 0.0))
-        lag, flexible = column(i, LAG), column(i, COMPLIANCE)
-        if DAMPING not in self.unknown:
-            rows.append(({lag: 1.0, flexible: -float(self.model.retardation[i])}, 0.0))
-        elif DAMPING in self.common and i > 0:
-            share = float(self.model.stiffness[0] / self.model.stiffness[i])
-            if STIFFNESS in self.unknown:
-                share = 1.0
-            rows.append(({lag: 1.0, column(0, LAG): -share}, 0.0))
-        if not self.offsets:
-            rows.append(({column(i, OFFSET): 1.0}, believed[column(i, OFFSET)]))
-        return rows
-
-    def parameters(self) -> list[tuple[str, str, str, float]]:
-        """Name, words, unit and typical size of each free parameter as users read it."""
-        model, L = self.model, self.size
-        m = model.mass
-        found: list[tuple[str, str, str, float]] = []
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The free parameters."""
+        model, L, m, one = self.model, self.size, self.model.mass, {-1: 1.0}
+        free = []
         if MASS_GROUP in self.unknown:
-            found.append((MASS_GROUP, "mass", "kg", m))
+            free.append(Parameter(MASS_GROUP, "mass", "kg", m, ({MASS: 1.0}, one)))
         if CENTER in self.unknown:
-            found += [(f"{CENTER}.{x}", f"centre of mass along {x}", "m", L) for x in _AXES]
+            for j, x in enumerate(AXES):
+                ratio = {1 + j: 1.0}, {MASS: 1.0}
+                free.append(Parameter(f"{CENTER}.{x}", f"centre of mass along {x}", "m", L, ratio))
         if MOMENTS in self.unknown:
-            found += [(f"{MOMENTS}.{x}", f"inertia {x}", "kg m^2", m * L * L) for x in _SIX]
-        for group, word, words, unit, typical in (
-            (STIFFNESS, "stiffness", "stiffness", "N", None),
-            (DAMPING, "retardation_time", "retardation time", "s", 1e-2),
-            (None, "length_offset", "length offset", "m", 0.01),
-            (FRICTION, "coulomb", "Coulomb friction", "N m", 0.05),
-            (FRICTION, "viscous", "viscous friction", "N m s/rad", 1e-3),
-            (STATIC, "static", "static friction", "N m", 0.05),
+            size = m * L * L
+            free += [Parameter(f"{MOMENTS}.{x}", f"inertia {x}", "kg m^2", size, None) for x in SIX]
+        for group, word, words, unit, typical, above, below in (
+            (STIFFNESS, "stiffness", "stiffness", "N", None, (), COMPLIANCE),
+            (DAMPING, "retardation_time", "retardation time", "s", 1e-2, (LAG,), COMPLIANCE),
+            (None, "length_offset", "length offset", "m", 0.01, (OFFSET,), None),
+            (FRICTION, "coulomb", "Coulomb friction", "N m", 0.05, (COULOMB,), None),
+            (FRICTION, "viscous", "viscous friction", "N m s/rad", 1e-3, (VISCOUS,), None),
+            (STATIC, "static", "static friction", "N m", 0.05, (COULOMB, EXCESS), None),
         ):
             if self.offsets if group is None else group in self.unknown:
-                owners = ["all"] if group in self.common else list(model.names)
-                for i, owner in enumerate(owners):
+                for i, owner in enumerate(["all"] if group in self.common else model.names):
                     size = float(model.stiffness[i]) if typical is None else typical
-                    found.append((f"{owner}.{word}", f"{owner}'s {words}", unit, size))
-        return found
+                    ratio = (
+                        {column(i, k): 1.0 for k in above} or one,
+                        one if below is None else {column(i, below): 1.0},
+                    )
+                    name, label = f"{owner}.{word}", f"{owner}'s {words}"
+                    free.append(Parameter(name, label, unit, size, ratio))
+        return tuple(free)
 
     def values(self, theta: Array) -> Array:
-        """The free parameters as users read them, in the order of `parameters`."""
-        model = self.model.moved(theta)
-        parts: list[Array] = []
-        if MASS_GROUP in self.unknown:
-            parts.append(np.array([model.mass]))
-        if CENTER in self.unknown:
-            parts.append(model.center_of_mass)
-        if MOMENTS in self.unknown:
-            parts.append(model.inertia)
-        for group, values in (
-            (STIFFNESS, model.stiffness), (DAMPING, model.retardation), (None, model.offset),
-            (FRICTION, model.coulomb), (FRICTION, model.viscous), (STATIC, model.static),
-        ):  # fmt: skip
-            if self.offsets if group is None else group in self.unknown:
-                parts.append(values[:1] if group in self.common else values)
-        return np.concatenate(parts) if parts else np.zeros(0)
+        """The free parameters at a vector, shape (f,)."""
+        inertia = iter(central_parameters(theta[:SIZE])[2])
 
-    def ratios(self) -> list[tuple[dict[int, float], dict[int, float]] | None]:
-        """Each free parameter as one linear form of the vector over another, both with a constant
-        at entry -1; None: what is neither, moments of inertia about the centre of mass."""
-        one = {-1: 1.0}
-        found: list[tuple[dict[int, float], dict[int, float]] | None] = []
-        if MASS_GROUP in self.unknown:
-            found.append(({MASS: 1.0}, one))
-        if CENTER in self.unknown:
-            found += [({1 + j: 1.0}, {MASS: 1.0}) for j in range(3)]
-        if MOMENTS in self.unknown:
-            found += [None] * 6
-        for group, above, below in (
-            (STIFFNESS, (), COMPLIANCE), (DAMPING, (LAG,), COMPLIANCE), (None, (OFFSET,), None),
-            (FRICTION, (COULOMB,), None), (FRICTION, (VISCOUS,), None),
-            (STATIC, (COULOMB, EXCESS), None),
-        ):  # fmt: skip
-            if self.offsets if group is None else group in self.unknown:
-                for i in range(1 if group in self.common else len(self.model.names)):
-                    form = {column(i, what): 1.0 for what in above} or one
-                    found.append((form, one if below is None else {column(i, below): 1.0}))
-        return found
+        def at(form: Form) -> float:
+            return sum(factor * (theta[k] if k >= 0 else 1.0) for k, factor in form.items())
+
+        ratios = [p.ratio for p in self.parameters]
+        return np.array([next(inertia) if r is None else at(r[0]) / at(r[1]) for r in ratios])
 
     def jacobian(self, theta: Array, Z: Array) -> Array:
         """Of `values` by steps y along the columns of Z, by central differences."""
-        J = np.empty((len(self.parameters()), Z.shape[1]))
+        J = np.empty((len(self.parameters), Z.shape[1]))
         for k in range(Z.shape[1]):
             step = 1e-5 * Z[:, k]
             J[:, k] = (self.values(theta + step) - self.values(theta - step)) / 2e-5

@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 import numpy.typing as npt
-from pydrake.solvers import Binding, MathematicalProgram, Solve
-from scipy.linalg import null_space
+from pydrake.solvers import Binding, MathematicalProgram
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError, accepted_names
-from cdpr_drake.identification.identifiability import unidentifiable_words
-from cdpr_drake.identification.motion_term import OFF_WITHIN, MotionTerm
-from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Layout, offsets_needed
-from cdpr_drake.identification.physical_bounds import make_program, smooth_program, violated
+from cdpr_drake.identification.equations import (
+    MOST_STEPS,
+    ROUGHLY_SETTLED,
+    SETTLED,
+    Equations,
+    Fit,
+    Point,
+    huber_limit,
+    offs_of,
+    scatter_of_blocks,
+)
+from cdpr_drake.identification.motion_term import MotionTerm
+from cdpr_drake.identification.parameters import GROUPS, DynamicModel, Form, Layout, offsets_needed
+from cdpr_drake.identification.physical_bounds import smooth_program, violated
 from cdpr_drake.identification.result import (
     AT_THE_RIM,
     MISFIT,
@@ -26,10 +35,10 @@ from cdpr_drake.identification.result import (
     IdentificationResult,
     TermFit,
 )
-from cdpr_drake.identification.robust_cost import huber_cost, huber_limit, huber_weights
 from cdpr_drake.identification.samples import LoggedMotion, WinchSamples
-from cdpr_drake.identification.terms import CableTerm, Prior, Rows, Term, WinchTerm, prior_rows
-from cdpr_drake.numerics.own_terms import OwnTerms, ProgramReport, ProgramValues, is_convex
+from cdpr_drake.identification.terms import CableTerm, Term, WinchTerm, prior_rows
+from cdpr_drake.numerics.null_directions import named_direction, sparse_basis
+from cdpr_drake.numerics.own_terms import OwnTerms, ProgramValues, is_convex
 
 BY_LIKELIHOOD = (
     "standard errors, covariance and chi-square are those of measurements and priors alone; own "
@@ -42,50 +51,15 @@ CONTRADICTED = (
     "each other"
 )
 
-MOST_STEPS = 30
-CLOSE, SETTLED = 1e-9, 1e-5
-"""Steps end where the vector changes by less, in typical sizes or in standard errors."""
-
-ROUGHLY_SETTLED = 1e-2
-"""The same where a solver of nonlinear programs takes the steps."""
-
 UNSETTLED, CONTRADICTION = 0.1, 4.0
 """Standard errors of the last step, and of priors, from which on a remark says so."""
 
-MOST_WEIGHINGS = 6
-"""Times that the error of poses is estimated, each from the last parameters."""
+UNTOLD = 1.0
+"""A direction is told where its standard deviation is below this many typical sizes."""
 
-MOST_HALVINGS = 8
-NOTHING = 1.0
-"""Chi-square by which a vector may be worse than another and no data would tell, of residuals that
-are as large as their noise."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A least squares solution: vector, directions that are free, information along them, and
-    what the belief left unexplained.
-
-    Attributes:
-        active: What no robot has of the solution without inequalities, in words.
-        solver: What found the vector.
-    """
-
-    theta: Array
-    Z: Array
-    H: Array
-    first: list[Array]
-    rows: list[Rows]
-    weights: list[Array]
-    limits: list[float]
-    steps: int
-    last_step: float
-    active: tuple[str, ...] = ()
-    solver: str = "least squares"
-
-    def pairs(self) -> list[tuple[Rows, Array]]:
-        """Rows and weights of each term, and of priors."""
-        return list(zip(self.rows, self.weights, strict=True))
+LITTLE_TURN = np.radians(2.0)
+LITTLE_ACCELERATION = 0.05
+"""Turns [rad] and accelerations, over gravity, that count as none."""
 
 
 class IdentificationProgram(OwnTerms):
@@ -139,9 +113,8 @@ class IdentificationProgram(OwnTerms):
         groups = tuple(dict.fromkeys(unknown))
         self.layout = Layout(model, groups, tuple(common), offsets_needed(groups), size)
         self.gravity = np.asarray(gravity, float)
-        self.terms: list[Term] = []
-        self._weighed = self.terms
-        self._priors: list[Prior] = []
+        self.equations = Equations(self.layout)
+        self.terms = self.equations.terms
         self._prog: MathematicalProgram | None = None
 
     def AddMotion(self, samples: LoggedMotion) -> MotionTerm:
@@ -161,7 +134,7 @@ class IdentificationProgram(OwnTerms):
         """Lengths that winches count, beside those that the poses have.
 
         Args:
-            samples: The motion.
+            samples: A motion.
             counted: Unstrained lengths at its samples, up to a constant, shape (s, m) [m].
             sigma: Their standard deviation, with what is wrong of the geometry [m].
             slack_below: Cables with less tension tell nothing [N].
@@ -196,37 +169,36 @@ class IdentificationProgram(OwnTerms):
         _positive("prior", std)
         if group not in GROUPS:
             raise IdentificationError(f"priors: found {group!r}; {accepted_names(group, GROUPS)}")
-        self._priors += prior_rows(self.layout.model, group, std)
+        self.equations.priors += prior_rows(self.layout.model, group, std)
 
     def names(self) -> tuple[str, ...]:
         """Names of the unknown parameters."""
-        return tuple(one[0] for one in self.layout.parameters())
+        return tuple(one.name for one in self.layout.parameters)
 
     def FindUnidentifiable(self) -> tuple[str, ...]:
         """What these measurements and priors cannot tell, in words, at the believed model."""
-        theta = self.layout.model.vector()
-        Z = self._directions(self._scaled(theta)[0])
         told: list[Term] = [t.told() if isinstance(t, MotionTerm) else t for t in self.terms]
-        information = self._information(self._rows(theta, told), [])
-        H = np.asarray(Z.T @ information @ Z)
-        return unidentifiable_words(self.layout, theta, Z, H, self.terms)
+        theta, Z, H = self._information(told)
+        parameters = self.layout.parameters
+        J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
+        back = np.linalg.inv(J / np.array([p.size for p in parameters])[:, None])
+        values, V = np.linalg.eigh(back.T @ H @ back)
+        N, why = V[:, values < 1.0 / UNTOLD**2], _reason(self.terms)
+        words = [p.words for p in parameters]
+        return tuple(named_direction(v, words) + why for v in sparse_basis(N).T)
 
     def FindCovariance(self) -> Array:
         """Covariance of the parameters by these measurements at the believed model, shape (f, f).
 
         With the true model it is the Cramer-Rao bound, as far as smoothing keeps what was measured.
         """
-        theta = self.layout.model.vector()
-        Z = self._directions(self._scaled(theta)[0])
-        H = Z.T @ self._information(self._rows(theta, self.terms), []) @ Z
-        J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
-        return np.asarray(J @ np.linalg.solve(H, J.T))
+        return self._covariance(*self._information(self.terms))
 
     def Solve(self, outliers: bool = True) -> IdentificationResult:
         """The most likely parameters.
 
         Args:
-            outliers: Whether residuals beyond four sigmas count linearly.
+            outliers: True if residuals beyond four sigmas count linearly.
 
         Raises:
             IdentificationError: Nothing was measured; a parameter cannot be told and has no prior:
@@ -242,46 +214,40 @@ class IdentificationProgram(OwnTerms):
                 f"unknown: {'; '.join(untold[:2])}{more}; accepted: fewer unknowns, a prior for "
                 "them, or a log of a motion that excites them"
             )
-        fit = self._weighed_fit(outliers)
+        fit = self.equations.weighed(outliers)
         if self.has_own_terms:
-            return self._with_own_terms(fit, began)
-        fit = self._some_robot(fit)
-        self._check_end(fit.theta, fit)
-        how = AT_THE_RIM if fit.active else OPTIMAL, fit.solver, fit.active
-        return self._result(fit, fit.theta, how, time.perf_counter() - began)
+            result = self._with_own_terms(fit)
+        else:
+            fit = self.equations.some_robot(fit)
+            self.equations.check_end(fit)
+            result = self._result(fit)
+        return replace(result, wall_time=time.perf_counter() - began)
 
-    def _with_own_terms(self, fit: _Fit, began: float) -> IdentificationResult:
-        """The whole program, again and again until its weights do not change what it finds."""
-        theta, typical, program = fit.theta, self.layout.typical, self.prog()
-        step, far = 0, np.inf
-        while step < MOST_STEPS:
+    def _with_own_terms(self, fit: Fit) -> IdentificationResult:
+        """The whole program, again and again until its weights do not change its solution."""
+        layout, program, point = self.layout, self.prog(), fit.point
+        step, far, convex = 0, np.inf, True
+        # A solver of nonlinear programs comes no nearer than its tolerance.
+        while far >= (SETTLED if convex else ROUGHLY_SETTLED) and step < MOST_STEPS:
             step += 1
-            rows = self._rows(theta)
-            rests = [r.A @ (theta / typical) - r.b for r in rows]
-            weights = [huber_weights(*each) for each in zip(rests, fit.limits, strict=True)]
-            self._weigh(rows, weights, theta)
+            point = self.equations.at(point.theta, fit.terms)
+            weights = point.weights(fit.limits)
+            H = self._weigh(point, weights)
             convex = is_convex(program)
-            x, solver, said = self._solve_whole(
-                theta / typical,
-                "parameters that some robot has",
-                None if convex else smooth_program(self.layout, program),
-            )
-            way = x - theta / typical
-            said_by = float(way @ self._information(rows, weights) @ way)
-            far = float(np.sqrt(max(said_by, 0.0)))
-            theta = x * typical
-            # A solver of nonlinear programs comes no nearer than its tolerance.
-            if far < (SETTLED if convex else ROUGHLY_SETTLED):
-                break
+            smooth = None if convex else smooth_program(layout, program)
+            x, solver, said = self._solve_whole(point.x, "parameters that some robot has", smooth)
+            far = float(np.sqrt(max(float((x - point.x) @ H @ (x - point.x)), 0.0)))
+            theta = x * layout.typical
+            rests = [r.A @ (theta / layout.typical) - r.b for r in point.rows]
+            point = Point(theta, theta / layout.typical, point.rows, rests)
         words = [BY_LIKELIHOOD]
         if far > ROUGHLY_SETTLED:
             words.append(NOT_SETTLED.format(far))
-        active = violated(self.layout, fit.theta)
-        how = AT_THE_RIM if active else OPTIMAL, solver, active
-        end = replace(fit, theta=theta, rows=rows, weights=weights, steps=step, last_step=far)
-        found = self._result(end, theta, how, time.perf_counter() - began)
-        report: ProgramReport = self._report(x, solver, said, words)
-        return replace(found, program=report)
+        end = replace(
+            fit, point=point, weights=weights, steps=step, last_step=far, solver=solver,
+            active=violated(layout, fit.point.theta),
+        )  # fmt: skip
+        return replace(self._result(end), program=self._report(x, solver, said, words))
 
     def prog(self) -> MathematicalProgram:
         """The same problem for Drake's solvers, weighted as at the believed model; one object.
@@ -291,10 +257,9 @@ class IdentificationProgram(OwnTerms):
         negative. Measurements and priors come before it; what is added to it counts in `Solve`.
         """
         if self._prog is None:
-            theta = self.layout.model.vector()
-            rows = self._rows(theta)
-            self._prog = self._program(rows, [np.ones(len(r.b)) for r in rows], theta)
-            self._prog.SetInitialGuess(self._prog.decision_variables(), theta / self.layout.typical)
+            belief = self.equations.at(self.layout.model.vector())
+            self._prog = self.equations.program(belief)
+            self._prog.SetInitialGuess(self._prog.decision_variables(), belief.x)
             self._seal()
         return self._prog
 
@@ -307,22 +272,17 @@ class IdentificationProgram(OwnTerms):
         Raises:
             IdentificationError: No unknown parameter has the name.
         """
-        program, layout = self.prog(), self.layout
-        chosen = self._which(of)
-        names, ratios = self.names(), layout.ratios()
-        x, typical = program.decision_variables(), layout.typical
-        told = tuple(names[k] for k in chosen)
-        forms = [ratios[k] for k in chosen]
-        matrix, offset = np.zeros((len(chosen), len(x))), np.zeros(len(chosen))
-        for r, form in enumerate(forms):
-            if form is None or form[1] != {-1: 1.0}:
-                break
-            matrix[r], offset[r] = self._form(form[0])
-        else:
-            return ProgramValues(x, matrix, offset, told)
+        x, layout, chosen = self.prog().decision_variables(), self.layout, self._which(of)
+        names = tuple(layout.parameters[k].name for k in chosen)
+        ratios = [layout.parameters[k].ratio for k in chosen]
+        forms = [self._form(r[0]) for r in ratios if r is not None and r[1] == {-1: 1.0}]
+        if len(forms) == len(chosen):
+            matrix, offset = (np.array(part) for part in zip(*forms, strict=True))
+            return ProgramValues(x, matrix, offset, names)
         return ProgramValues(
-            x, np.diag(typical), np.zeros(len(x)), told, lambda theta: layout.values(theta)[chosen]
-        )
+            x, np.diag(layout.typical), np.zeros(len(x)), names,
+            lambda theta: layout.values(theta)[chosen],
+        )  # fmt: skip
 
     def AddLinearConstraint(
         self,
@@ -337,26 +297,23 @@ class IdentificationProgram(OwnTerms):
         A centre of mass is a ratio of two linear forms, stiffness and retardation time too: a bound
         on one, times what is below, is linear.
         """
-        v, ratios = self._chosen(of), self.layout.ratios()
-        rows = np.atleast_2d(np.asarray(A, float))
-        forms = [ratios[k] for k in self._which(of)]
+        v, rows = self._chosen(of), np.atleast_2d(np.asarray(A, float))
+        ratios = [self.layout.parameters[k].ratio for k in self._which(of)]
         single = rows.shape[1] == v.size and np.all(np.sum(rows != 0.0, axis=1) == 1)
-        places = [int(np.argmax(row != 0.0)) for row in rows] if single else []
-        if v.transform is None or not single or any(forms[k] is None for k in places):
+        mine = [ratios[int(np.argmax(row != 0.0))] for row in rows] if single else [None]
+        if v.transform is None or any(ratio is None for ratio in mine):
             return super().AddLinearConstraint(A, lower, upper, of, name)
         low, high = self._bounds(lower, upper, len(rows))
         parts, most = [], []
-        for row, k, ends in zip(rows, places, zip(low, high, strict=True), strict=True):
-            form = forms[k]
-            assert form is not None
-            above, below = (self._form(one) for one in form)
+        for row, ratio, ends in zip(rows, mine, zip(low, high, strict=True), strict=True):
+            assert ratio is not None
+            factor, (above, below) = float(np.sum(row)), map(self._form, ratio)
             for sign, end in ((-1.0, ends[0]), (1.0, ends[1])):
                 if np.isfinite(end):  # sign (a above - end below) <= 0, below > 0
-                    line = sign * (row[k] * above[0] - end * below[0])
-                    rest = sign * (row[k] * above[1] - end * below[1])
+                    line = sign * (factor * above[0] - end * below[0])
                     size = float(np.linalg.norm(line))
                     parts.append(line / size)
-                    most.append(-rest / size)
+                    most.append(-sign * (factor * above[1] - end * below[1]) / size)
         if not parts:
             raise IdentificationError("own constraint: found no finite bound; accepted: one")
         binding = self.prog().AddLinearConstraint(
@@ -364,7 +321,7 @@ class IdentificationProgram(OwnTerms):
         )
         return self._named(binding, "constraint", name)
 
-    def _form(self, form: dict[int, float]) -> tuple[Array, float]:
+    def _form(self, form: Form) -> tuple[Array, float]:
         """A linear form of the vector by the program's variables, and its constant."""
         typical = self.layout.typical
         line = np.zeros(len(typical))
@@ -395,286 +352,89 @@ class IdentificationProgram(OwnTerms):
                 "measurements and priors first"
             )
 
-    def _weigh(self, rows: list[Rows], weights: list[Array], theta: Array) -> None:
-        """Puts the weights and what is known at a vector into the program that is kept."""
-        program = self.prog()
-        g, c = self._gradient(rows, weights)
+    def _weigh(self, point: Point, weights: list[Array]) -> Array:
+        """Puts weights and what is known at a point into the program; the information."""
+        program, (H, g, c) = self.prog(), point.normal(weights)
         cost = self._built_in_costs[0].evaluator()
-        cost.UpdateCoefficients(self._information(rows, weights), -g, 0.5 * c, is_convex=True)
-        E, e = self._scaled(theta)
+        cost.UpdateCoefficients(H, -g, 0.5 * c, is_convex=True)
+        E, e = self.equations.equalities(point.theta)
         if len(e):
             program.linear_equality_constraints()[0].evaluator().UpdateCoefficients(E, e)
-
-    def _program(self, rows: list[Rows], weights: list[Array], theta: Array) -> MathematicalProgram:
-        g, c = self._gradient(rows, weights)
-        cost = (self._information(rows, weights), g, c)
-        return make_program(self.layout, cost, self._scaled(theta))
-
-    def _scaled(self, theta: Array) -> tuple[Array, Array]:
-        """Constraints on the vector over its typical sizes, with rows of length one."""
-        E, e = self.layout.constraints(theta)
-        E = E * self.layout.typical
-        size = np.linalg.norm(E, axis=1)
-        return E / size[:, None], e / size
-
-    def _directions(self, E: Array) -> Array:
-        """Orthonormal basis of what the constraints leave free, shape (n, f)."""
-        n = len(self.layout.typical)
-        return np.asarray(null_space(E)) if len(E) else np.eye(n)
-
-    def _rows(self, theta: Array, terms: Sequence[Term] | None = None) -> list[Rows]:
-        """Of all terms, or some others, and priors, by the vector over its typical sizes."""
-        typical = self.layout.typical
-        found = [term.rows(theta) for term in (self._weighed if terms is None else terms)]
-        found = [Rows(r.A * typical, r.b) for r in found]
-        A, b = np.zeros((len(self._priors), len(typical))), np.zeros(len(self._priors))
-        for r, (entries, value, std) in enumerate(self._priors):
-            for k, factor in entries.items():
-                A[r, k] = factor * typical[k] / std
-            b[r] = value / std
-        return [*found, Rows(A, b)]
-
-    def _information(self, rows: list[Rows], weights: list[Array]) -> Array:
-        H = np.zeros((len(self.layout.typical),) * 2)
-        for k, r in enumerate(rows):
-            w = weights[k][:, None] if weights else 1.0
-            H += (w * r.A).T @ r.A
         return H
 
-    def _gradient(self, rows: list[Rows], weights: list[Array]) -> tuple[Array, float]:
-        g, c = np.zeros(len(self.layout.typical)), 0.0
-        for r, w in zip(rows, weights, strict=True):
-            g += r.A.T @ (w * r.b)
-            c += float(r.b @ (w * r.b))
-        return g, c
+    def _information(self, terms: Sequence[Term]) -> tuple[Array, Array, Array]:
+        """The believed vector, directions that are free there, and information along them."""
+        point = self.equations.at(self.layout.model.vector(), terms)
+        Z = self.equations.directions(point.theta)
+        return point.theta, Z, np.asarray(Z.T @ point.normal()[0] @ Z)
 
-    def _weighed_fit(self, outliers: bool) -> _Fit:
-        """With the error of poses where they are off by more than they jitter."""
-        self._weighed = self.terms
-        fit = self._least_squares(outliers)
-        for _ in range(MOST_WEIGHINGS):
-            found = [
-                t.with_errors_of_poses(fit.theta, outliers) if isinstance(t, MotionTerm) else t
-                for t in self._weighed
-            ]
-            offs = _offs(self._weighed), _offs(found)
-            if np.allclose(*offs, rtol=OFF_WITHIN, atol=0.0):
-                break
-            self._weighed = found
-            fit = self._least_squares(outliers, fit.theta)
-        return fit
+    def _covariance(self, theta: Array, Z: Array, H: Array) -> Array:
+        """Of the parameters, by information along directions, shape (f, f)."""
+        J = self.layout.jacobian(theta, self.layout.typical[:, None] * Z)
+        return np.asarray(J @ np.linalg.solve(H, J.T))
 
-    def _some_robot(self, fit: _Fit) -> _Fit:
-        """The same with inequalities, where least squares found what no robot has.
-
-        Noise, and so weights, depend on the body: those at a body that cannot be are of no use.
-        So the program is solved again and again, weighted as at its last solution, or at the belief
-        if that is better than the first, by steps that do not raise the cost.
-
-        Raises:
-            IdentificationError: The program has no solution.
-        """
-        active, typical = violated(self.layout, fit.theta), self.layout.typical
-        if not active:
-            return fit
-
-        def at(theta: Array) -> tuple[float, list[Rows], list[Array]]:
-            rows = self._rows(theta)
-            rests = [r.A @ (theta / typical) - r.b for r in rows]
-            weights = [huber_weights(*each) for each in zip(rests, fit.limits, strict=True)]
-            return _cost(rests, fit.limits), rows, weights
-
-        theta, solver = self._solved(fit.rows, fit.weights, fit.theta)
-        cost, rows, weights = at(theta)
-        belief = self.layout.model.vector()
-        if not violated(self.layout, belief):
-            there = at(belief)
-            if there[0] < cost:
-                theta, (cost, rows, weights) = belief, there
-        far, step = np.inf, 0
-        while far >= ROUGHLY_SETTLED and step < MOST_STEPS:
-            step += 1
-            way = self._solved(rows, weights, theta)[0] - theta
-            x = way / typical
-            far = float(np.sqrt(max(float(x @ self._information(rows, weights) @ x), 0.0)))
-            for k in range(MOST_HALVINGS):
-                there = at(theta + 0.5**k * way)
-                if there[0] <= cost:
-                    theta, (cost, rows, weights) = theta + 0.5**k * way, there
-                    break
-            else:
-                break  # nothing along it is better
-        Z = self._directions(self._scaled(theta)[0])
-        H = np.asarray(Z.T @ self._information(rows, weights) @ Z)
-        return replace(
-            fit, theta=theta, Z=Z, H=H, rows=rows, weights=weights, steps=fit.steps + step,
-            last_step=far, active=active, solver=solver,
-        )  # fmt: skip
-
-    def _solved(self, rows: list[Rows], weights: list[Array], theta: Array) -> tuple[Array, str]:
-        """What Drake finds of the program, weighted as at a vector, and by which solver.
-
-        Raises:
-            IdentificationError: It finds nothing.
-        """
-        program = self._program(rows, weights, theta)
-        found = Solve(program)
-        if not found.is_success():
-            raise IdentificationError(
-                f"identification: found {found.get_solution_result()} by "
-                f"{found.get_solver_id().name()}; accepted: data that some body can have"
-            )
-        x = found.GetSolution(program.decision_variables())
-        return x * self.layout.typical, found.get_solver_id().name()
-
-    def _least_squares(self, outliers: bool, start: Array | None = None) -> _Fit:
-        """Without inequalities, until weights and what is not quite linear do not change.
-
-        Steps are those of Gauss and Newton, halved while the cost grows. They begin at the belief,
-        or at another vector, shape (n,).
-        """
-        typical, believed = self.layout.typical, self.layout.model.vector()
-        theta = believed if start is None else start
-        rows = self._rows(believed)
-        limits = [np.inf] * len(rows)
-        first = [r.A @ (believed / typical) - r.b for r in rows]
-        rows = rows if start is None else self._rows(theta)
-        for step in range(1, MOST_STEPS + 1):
-            rests = [r.A @ (theta / typical) - r.b for r in rows]
-            if outliers and step > 1:
-                limits = [*(huber_limit(rest) for rest in rests[:-1]), np.inf]
-            weights = [huber_weights(*each) for each in zip(rests, limits, strict=True)]
-            E, e = self._scaled(theta)
-            Z = self._directions(E)
-            known = np.linalg.lstsq(E, e, rcond=None)[0] if len(e) else np.zeros(len(typical))
-            A = np.vstack([np.sqrt(w)[:, None] * r.A for r, w in zip(rows, weights, strict=True)])
-            b = np.concatenate([np.sqrt(w) * r.b for r, w in zip(rows, weights, strict=True)])
-            y = np.linalg.lstsq(A @ Z, b - A @ known, rcond=None)[0]
-            way = (known + Z @ y) * typical - theta
-            moved = float(np.max(np.abs(way / typical)))
-            said = float(np.linalg.norm(A @ (way / typical)))
-            before, share = _cost(rests, limits), 1.0
-            for _ in range(MOST_HALVINGS):
-                tried = theta + share * way
-                rows_there = self._rows(tried)
-                there = _cost([r.A @ (tried / typical) - r.b for r in rows_there], limits)
-                if there <= before + _indifferent(before, rows):
-                    theta, rows = tried, rows_there
-                    break
-                share *= 0.5
-            else:
-                said = 0.0  # nothing along it is better
-            if said < SETTLED or (moved < CLOSE and step > 2):
-                break
-        H = (A @ Z).T @ (A @ Z)
-        return _Fit(theta, Z, H, first, rows, weights, limits, step, said)
-
-    def _check_end(self, theta: Array, fit: _Fit) -> None:
-        """Refuses a vector that explains the measurements less well than the belief.
-
-        Raises:
-            IdentificationError: It does; says by how much.
-        """
-        rows, x = self._rows(theta), theta / self.layout.typical
-        end = _cost([r.A @ x - r.b for r in rows], fit.limits)
-        start = _cost(fit.first, fit.limits)
-        if end > start + _indifferent(start, rows):
-            raise IdentificationError(
-                f"identification: found parameters with chi-square {end:.4g}, where those "
-                f"that are believed have {start:.4g}; accepted: an end that is no worse than "
-                "its start, as with fewer unknowns, priors or another belief"
-            )
-
-    def _between_blocks(self, fit: _Fit, x: Array) -> float:
-        """By how much estimates scatter more, in variance, than independent residuals make them.
-
-        Errors of poses last longer than a sample. With gradients g_b = A_b' r_b of the blocks b,
-        B of them and p unknowns, it is B / (B - 1) sum g_b' H^-1 g_b / p: the mean, over
-        directions, of the ratio of the variance that groups of rows tell to that of single rows.
-
-        Source: Liang, Zeger, Longitudinal data analysis using generalized linear models, 1986.
-        """
-        total, count = 0.0, 0
-        for term, (r, w) in zip(self.terms, fit.pairs(), strict=False):
-            if isinstance(term, MotionTerm):
-                A = np.sqrt(w)[:, None] * (r.A @ fit.Z)
-                rest = np.sqrt(w) * (r.A @ x - r.b)
-                for block in term.samples.blocks():
-                    rows = slice(6 * block.start, 6 * block.stop)
-                    g = A[rows].T @ rest[rows]
-                    total, count = total + float(g @ np.linalg.solve(fit.H, g)), count + 1
-        return total / len(fit.H) * count / max(count - 1, 1)
-
-    def _result(
-        self, fit: _Fit, theta: Array, how: tuple[str, str, tuple[str, ...]], wall: float
-    ) -> IdentificationResult:
-        layout = self.layout
-        x = theta / layout.typical
-        offs = _offs(self._weighed)
-        fitted = sum(float(np.sum(w * (r.A @ x - r.b) ** 2)) for r, w in fit.pairs())
-        off = sum(int(np.sum(w < 1.0)) for w in fit.weights[:-1])
-        known, weights = fit.rows, fit.weights
+    def _result(self, fit: Fit) -> IdentificationResult:
+        layout, point, offs = self.layout, fit.point, offs_of(fit.terms)
+        fitted = sum(
+            float(np.sum(w * rest**2)) for w, rest in zip(fit.weights, point.rests, strict=True)
+        )
+        rests, weights = point.rests, fit.weights
         if any(offs):  # as sensors are: weights are not those of the fit
-            known = self._rows(theta, self.terms)
-            rests = [r.A @ x - r.b for r in known]
-            limited = np.isfinite(fit.limits)
+            exact = self.equations.at(point.theta)
             limits = [
-                huber_limit(r) if at else np.inf for r, at in zip(rests, limited, strict=True)
+                huber_limit(r) if np.isfinite(limit) else np.inf
+                for r, limit in zip(exact.rests, fit.limits, strict=True)
             ]
-            weights = [huber_weights(*each) for each in zip(rests, limits, strict=True)]
+            rests, weights = exact.rests, exact.weights(limits)
         fits, chi, count = {}, 0.0, 0
-        for term, r, w in zip(self.terms, known[:-1], weights[:-1], strict=True):
-            rest = np.sqrt(w) * (r.A @ x - r.b)
-            fits[term.name] = TermFit(
-                len(r.b), float(np.sqrt(np.mean(rest**2))) if len(rest) else 0.0,
-                term.misfit(theta),
-            )  # fmt: skip
-            chi, count = chi + float(rest @ rest), count + len(rest)
-        prior = known[-1].A @ x - known[-1].b
+        for term, rest, w in zip(self.terms, rests[:-1], weights[:-1], strict=True):
+            off, n = np.sqrt(w) * rest, len(rest)
+            rms = float(np.sqrt(np.mean(off**2))) if n else 0.0
+            fits[term.name] = TermFit(n, rms, term.misfit(point.theta))
+            chi, count = chi + float(off @ off), count + n
+        prior = rests[-1]
         chi, count = chi + float(prior @ prior), count + len(prior)
         degrees = max(count - fit.Z.shape[1], 1)
-        J = layout.jacobian(theta, layout.typical[:, None] * fit.Z)
-        covariance = J @ np.linalg.solve(fit.H, J.T)
-        spread = float(np.sqrt(chi / degrees))
-        larger = fitted / degrees
+        spread, larger = float(np.sqrt(chi / degrees)), fitted / degrees
         if any(offs):
-            larger *= max(self._between_blocks(fit, x), 1.0)
-        status = MISFIT if spread > MISFIT_FACTOR else how[0]
+            larger *= max(scatter_of_blocks(fit), 1.0)
         remarks = []
         if fit.last_step > UNSETTLED:
             remarks.append(STILL_MOVED.format(fit.steps, fit.last_step))
         if np.max(np.abs(prior), initial=0.0) > CONTRADICTION:
             remarks.append(CONTRADICTED.format(np.max(np.abs(prior))))
-        largest = [one for term in self.terms for one in term.largest(theta)]
-        parameters = layout.parameters()
+        largest = [one for term in self.terms for one in term.largest(point.theta)]
+        status = MISFIT if spread > MISFIT_FACTOR else AT_THE_RIM if fit.active else OPTIMAL
         return IdentificationResult(
-            status=status, solver=how[1], model=layout.model.moved(theta), believed=layout.model,
-            names=tuple(p[0] for p in parameters), units=tuple(p[2] for p in parameters),
-            values=layout.values(theta), before=layout.values(layout.model.vector()),
-            covariance=covariance * max(larger, 1.0),
+            status=status, solver=fit.solver, model=layout.model.moved(point.theta),
+            believed=layout.model, names=self.names(),
+            units=tuple(p.unit for p in layout.parameters), values=layout.values(point.theta),
+            before=layout.values(layout.model.vector()),
+            covariance=self._covariance(point.theta, fit.Z, fit.H) * max(larger, 1.0),
             condition=float(np.sqrt(np.linalg.cond(fit.H))), terms=fits, chi_square=chi,
-            degrees=degrees, spread=spread, active=how[2], outliers=off,
+            degrees=degrees, spread=spread, active=fit.active,
+            outliers=sum(int(np.sum(w < 1.0)) for w in fit.weights[:-1]),
             largest=tuple(sorted(largest, key=lambda one: -one.sigmas)), steps=fit.steps,
-            last_step=fit.last_step, wall_time=wall, pose_error=max(offs, default=0.0),
-            remarks=tuple(remarks),
+            last_step=fit.last_step, pose_error=max(offs, default=0.0), remarks=tuple(remarks),
         )  # fmt: skip
-
-
-def _offs(terms: Sequence[Term]) -> list[float]:
-    """Errors of poses that motions are weighed with [m]."""
-    return [term.off for term in terms if isinstance(term, MotionTerm)]
-
-
-def _cost(rests: list[Array], limits: list[float]) -> float:
-    """Robust chi-square of all terms."""
-    return sum(huber_cost(*each) for each in zip(rests, limits, strict=True))
-
-
-def _indifferent(cost: float, rows: list[Rows]) -> float:
-    """`NOTHING` of residuals as large as these."""
-    return NOTHING * max(1.0, cost / max(sum(len(r.b) for r in rows), 1))
 
 
 def _positive(what: str, sigma: float) -> None:
     if not (np.isfinite(sigma) and sigma > 0.0):
         raise IdentificationError(f"{what}: sigma: found {sigma:g}; accepted: a finite number > 0")
+
+
+def _reason(terms: Sequence[Term]) -> str:
+    for term in terms:
+        if isinstance(term, MotionTerm):
+            s = term.samples
+            turned = np.einsum("ij,nij->n", s.R_WP[0], s.R_WP)
+            turn = float(np.max(np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0))))
+            if turn < LITTLE_TURN:
+                return ": no rotation in the log"
+            gravity = max(float(np.linalg.norm(term.gravity)), 1.0)
+            fast = float(np.sqrt(np.mean(s.A_WP[:, 3:] ** 2))) / gravity
+            if fast < LITTLE_ACCELERATION:
+                return ": hardly any acceleration in the log"
+            return ""
+    return ""

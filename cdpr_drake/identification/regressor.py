@@ -58,13 +58,8 @@ def inertia_regressor(R_WP: Array, V_WP: Array, A_WP: Array, gravity: Array) -> 
 def regressor_slopes(R_WP: Array, V_WP: Array, A_WP: Array, gravity: Array) -> Array:
     """How the regressor changes with the motion: with e(t), d(t) in exp([e]) R and p + d.
 
-    To first order w grows by e' + e x w, alpha by e'' + e' x w + e x alpha, a by d''.
-
-    Args:
-        R_WP: As for `inertia_regressor`.
-        V_WP: The same.
-        A_WP: The same.
-        gravity: The same.
+    To first order w grows by e' + e x w, alpha by e'' + e' x w + e x alpha, a by d''. Arguments are
+    those of `inertia_regressor`.
 
     Returns:
         Shape (n, 6, 10, 3, 6): by (e, d), by (e', d') and by (e'', d'') about and along axes of W.

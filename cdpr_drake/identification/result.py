@@ -110,18 +110,12 @@ class IdentificationResult:
     largest: tuple[Residual, ...]
     steps: int
     last_step: float
-    wall_time: float
     pose_error: float = 0.0
     remarks: tuple[str, ...] = ()
+    wall_time: float = 0.0
     program: ProgramReport | None = None
 
     @property
     def std(self) -> Array:
         """Standard errors of the parameters, shape (f,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
-
-    @property
-    def correlation(self) -> Array:
-        """Shape (f, f)."""
-        std = np.maximum(self.std, 1e-300)
-        return np.asarray(self.covariance / np.outer(std, std))

@@ -117,7 +117,7 @@ def sample_motion(
         if found != wanted:
             raise IdentificationError(f"{what}: found shape {found}; accepted: {wanted}")
     smoother = Smoother.over(time, bandwidth)
-    X = smoother.fit(_one_side(np.asarray(poses, float)))
+    X = smoother.fit(one_side(np.asarray(poses, float)))
     t = smoother.fit(np.asarray(tensions, float))
     at = smoother.sample_times()
     R, V, A, states = _motion(X, at)
@@ -154,11 +154,7 @@ def wrench_matrices(states: Array, cables: CableSet) -> Array:
 
 
 def wrench_matrix_slopes(states: Array, cables: CableSet) -> Array:
-    """Derivatives of wrench matrices by turns about and ways along the axes of W.
-
-    Args:
-        states: Of the platform, shape (s, 13).
-        cables: The cables.
+    """Derivatives of `wrench_matrices` by turns about and ways along the axes of W.
 
     Returns:
         Shape (s, 6, m, 6) [1/rad, 1/m]; NaN: a cable cannot.
@@ -186,11 +182,6 @@ def pose_shift(samples: LoggedMotion, cables: CableSet, gravity: Array) -> tuple
     Inertial parameters are fitted for each shift that is tried, so that a wrong belief does not
     look like a wrong clock.
 
-    Args:
-        samples: The motion.
-        cables: The cables.
-        gravity: Acceleration of a falling body in W, shape (3,) [m/s^2].
-
     Returns:
         The shift [s], positive where poses are late, and the factor by which the root mean square
         of what does not fit falls, at least 1; (0, 1) where the log is too short.
@@ -217,7 +208,7 @@ def pose_shift(samples: LoggedMotion, cables: CableSet, gravity: Array) -> tuple
     return float(fine.x), max(misfit(0.0) / max(float(fine.fun), 1e-12), 1.0)
 
 
-def _one_side(poses: Array) -> Array:
+def one_side(poses: Array) -> Array:
     """Pose rows whose quaternions do not jump from q to -q, which is the same rotation."""
     rows = poses.copy()
     seen = np.flatnonzero(np.isfinite(rows).all(axis=1))

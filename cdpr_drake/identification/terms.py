@@ -105,6 +105,12 @@ class CableTerm:
         A = np.stack([l0 * (s.tensions + T**2 * second), -l0 * first, np.ones_like(l0)], axis=2)
         return A, s.lengths - l0, np.asarray(s.tensions > self.slack_below)
 
+    def _rest(self, theta: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+        """Lengths that are not explained, shape (s, m) [m], and who is taut."""
+        A, b, taut = self._equations(theta)
+        cables = theta[SIZE:].reshape(-1, PER_CABLE)[:, [COMPLIANCE, LAG, OFFSET]]
+        return b - np.einsum("smk,mk->sm", A, cables), taut
+
     @once_a_vector
     def _noises(self, theta: Array) -> list[CorrelatedNoise]:
         """Of the lengths of taut cables in each block: of poses, of what winches count, of
@@ -139,9 +145,7 @@ class CableTerm:
 
     def largest(self, theta: Array) -> list[Residual]:
         """See `Term`."""
-        A, b, taut = self._equations(theta)
-        cables = theta[SIZE:].reshape(-1, PER_CABLE)[:, [COMPLIANCE, LAG, OFFSET]]
-        value = b - np.einsum("smk,mk->sm", A, cables)
+        value, taut = self._rest(theta)
         sigmas = np.zeros_like(value)
         for block, noise in zip(self.samples.blocks(), self._noises(theta), strict=True):
             keep = taut[block]
@@ -155,9 +159,8 @@ class CableTerm:
 
     def misfit(self, theta: Array) -> dict[str, float]:
         """See `Term`: lengths of taut cables."""
-        A, b, taut = self._equations(theta)
-        cables = theta[SIZE:].reshape(-1, PER_CABLE)[:, [COMPLIANCE, LAG, OFFSET]]
-        off = (b - np.einsum("smk,mk->sm", A, cables))[taut]
+        value, taut = self._rest(theta)
+        off = value[taut]
         return {"length_m": float(np.sqrt(np.mean(off**2))) if len(off) else 0.0}
 
 

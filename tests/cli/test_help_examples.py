@@ -44,7 +44,7 @@ LONG_WORK = {
     "calibrate": ["cdpr_drake.analyses.fits.calibration.fit_robot"],
     "calibrate-campaign": ["cdpr_drake.analyses.fits.campaign.kept_fit"],
     "calibrate-camera": ["cdpr_drake.analyses.fits.camera.find_boards"],
-    "identify-swings": ["cdpr_drake.analyses.fits.swings.fit_free_motion"],
+    "identify-swings": ["cdpr_drake.analyses.fits.swings.swing_log"],
     "identify": ["cdpr_drake.analyses.fits.identification.fit_dynamics"],
     "identify-campaign": ["cdpr_drake.analyses.fits.identify_campaign.simulate_campaign"],
     "scenarios": ["cdpr_drake.systems.diagrams.load.load_scenario"],

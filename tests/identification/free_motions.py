@@ -4,11 +4,13 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import cross_matrix
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.identification.regressor import symmetric
 from cdpr_drake.tensions.control_step_kernel import wrench_matrix_at
 
 G = np.array([0.0, 0.0, -9.81])
@@ -64,18 +66,18 @@ def given_tensions(case, time):
 
 @cache
 def motion(case, span=SPAN):
-    """Time, pose rows and tensions without noise, by Newton and Euler and Runge and Kutta."""
+    """Time, pose rows and tensions without noise, by Newton and Euler."""
     packed, model = cables(case).packed(), body(case)
-    mass, I_P = model.inertial()[0], _inertia(model)
+    mass, I_P = model.mass, symmetric(model.inertial()[4:])
     h = mass * model.center_of_mass
     M = np.block([[I_P, cross_matrix(h)], [-cross_matrix(h), mass * np.eye(3)]])
     back, W = np.linalg.inv(M), np.empty((6, packed.shape[0]))
 
-    def rate(x, t):
+    def rate(t, x):
         state = np.concatenate([x[:4] / np.linalg.norm(x[:4]), x[4:]])
         R = rotations_of_quaternions(state[None, :4])[0]
         wrench_matrix_at(state, packed, 0.0, W)
-        F = W @ t
+        F = W @ given_tensions(case, np.array([t]))[0]
         w = R.T @ state[7:10]
         bias = np.concatenate([np.cross(w, I_P @ w), np.cross(w, np.cross(w, h))])
         own = back @ (np.concatenate([R.T @ F[:3], R.T @ F[3:]]) - bias)
@@ -83,20 +85,11 @@ def motion(case, span=SPAN):
         q_dot = 0.5 * np.concatenate([[-W_q @ q[1:]], q[0] * W_q + np.cross(W_q, q[1:])])
         return np.concatenate([q_dot, state[10:], R @ own[:3], R @ own[3:] + G])
 
-    time, dt = np.arange(0.0, span, 1.0 / RATE), 1.0 / RATE
-    t, mid = given_tensions(case, time), given_tensions(case, time + 0.5 * dt)
-    rows = np.empty((len(time), 13))
-    x = np.array([1.0] + 12 * [0.0])
-    for n in range(len(time)):
-        rows[n] = x
-        after = t[n + 1] if n + 1 < len(time) else mid[n]
-        a = rate(x, t[n])
-        b = rate(x + 0.5 * dt * a, mid[n])
-        c = rate(x + 0.5 * dt * b, mid[n])
-        d = rate(x + dt * c, after)
-        x = x + dt / 6.0 * (a + 2.0 * b + 2.0 * c + d)
-        x[:4] /= np.linalg.norm(x[:4])
-    return time, rows[:, :7], t
+    time = np.arange(0.0, span, 1.0 / RATE)
+    how = {"method": "DOP853", "t_eval": time, "rtol": 1e-10, "atol": 1e-11, "max_step": 0.1}
+    poses = solve_ivp(rate, (0.0, time[-1]), [1.0] + 12 * [0.0], **how).y[:7].T
+    poses[:, :4] /= np.linalg.norm(poses[:, :4], axis=1, keepdims=True)
+    return time, poses, given_tensions(case, time)
 
 
 def log(case, seed=0, *, tension=0.0, place=0.0, angle=0.0, span=SPAN):
@@ -122,8 +115,3 @@ def believed(case, **changes):
     """Another platform than the true one."""
     wrong = {"mass": 10.0, "center_of_mass": np.zeros(3), "inertia": body(case).inertia}
     return replace(body(case), **{**wrong, **changes})
-
-
-def _inertia(model):
-    xx, yy, zz, xy, xz, yz = model.inertial()[4:]
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

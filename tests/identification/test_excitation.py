@@ -14,7 +14,7 @@ from tests.identification.logs import CABLES, ROBOT, G, believed
 TASK = ExcitationTask(
     cables=CABLES, inertial=believed().inertial(), gravity=G, start=ROBOT.home.transform(),
     lower=np.array([-0.2, -0.2, 0.15]), upper=np.array([0.2, 0.2, 0.45]), turn=0.35,
-    tensions=(3.0, 55.0), cable_speed=1.0, cable_acceleration=10.0, shortest=0.5, size=0.12,
+    tensions=(3.0, 55.0), cable_speed=0.35, cable_acceleration=10.0, shortest=0.5, size=0.12,
 )  # fmt: skip
 BETWEEN = 1.02
 """Limits are kept at 16 instants of a stretch; in between they may be passed by as much."""

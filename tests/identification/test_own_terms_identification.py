@@ -37,7 +37,7 @@ def by_scipy(found, extra, constraints=()):
     """Half of chi-square with the weights at what was found, and an own cost, by another solver."""
     program = made()
     theta, typical = found.model.vector(), program.layout.typical
-    rows = program._rows(theta)
+    rows = program.equations.at(theta).rows
     A = np.vstack([r.A[:, :10] for r in rows])
     b = np.concatenate([r.b - r.A[:, 10:] @ (theta / typical)[10:] for r in rows])
 
@@ -58,16 +58,12 @@ def by_scipy(found, extra, constraints=()):
     return values(solved.x), solved.fun
 
 
-def test_with_nothing_added_least_squares_answer():
+def test_nothing_added_and_a_cost_of_nothing_change_nothing():
     program = made()
     program.prog()
     again = program.Solve(outliers=False)
     assert again.program is None
     assert again.values.tobytes() == plain().values.tobytes()
-
-
-def test_a_cost_of_nothing_changes_nothing():
-    program = made()
     program.AddQuadraticCost(0.0, 0.0, of="mass")
     found = program.Solve(outliers=False)
     assert np.max(np.abs(found.values - plain().values) / plain().std) < SHARE
@@ -90,48 +86,43 @@ def test_a_quadratic_preference_is_a_prior():
     assert "own terms are not in them" in found.program.lost[0]
 
 
-def test_a_linear_bound_of_a_ratio_is_convex_and_what_scipy_finds():
-    """The centre of mass lies in the platform's box: moments over mass, so linear times mass."""
-    low, high = plain().values[1] + 2.0 * plain().std[1], 0.1
-    program = made()
-    program.AddLinearConstraint([1.0], low, high, of="center_of_mass.x", name="in the box")
-    found = program.Solve(outliers=False)
-    assert found.program.solver == "Clarabel"
-    assert found.values[1] == pytest.approx(low, abs=SHARE * plain().std[1])
-    other, cost = by_scipy(found, lambda v: 0.0, [lambda v: v[1] - low])
-    assert np.max(np.abs(found.values - other) / plain().std) < LOCAL
-    assert found.program.cost == pytest.approx(cost, rel=1e-5)
-
-
-def test_a_linear_bound_of_masses_and_moments_goes_to_a_nonlinear_program():
-    """Inertia about two axes is the same, as of a round platform."""
-    program = made()
-    program.AddLinearConstraint(
-        [1.0, -1.0], 0.0, 0.0, of=["inertia.xx", "inertia.yy"], name="round"
-    )
-    found = program.Solve(outliers=False)
-    assert found.program.solver == "SNOPT"
-    assert found.values[4] == pytest.approx(found.values[5], abs=1e-6 * found.values[4])
-    rules = [lambda v: (v[4] - v[5]) / 0.02, lambda v: (v[5] - v[4]) / 0.02]
-    other, cost = by_scipy(found, lambda v: 0.0, rules)
-    assert np.max(np.abs(found.values - other) / plain().std) < LOCAL
-    assert found.program.cost == pytest.approx(cost, rel=1e-5)
-    assert np.linalg.eigvalsh(pseudo_inertia(found.model.inertial()))[0] > 0.0
-
-
-def test_a_nonlinear_cost_is_what_scipy_finds():
+def round_about(v):
     """Products of inertia are small beside the moments, in logarithms."""
-    program = made()
+    return 200.0 * float(np.log(abs(v[4] / v[5])) ** 2 + np.log(abs(v[4] / v[6])) ** 2)
 
-    def round_about(v):
-        return 200.0 * float(np.log(abs(v[4] / v[5])) ** 2 + np.log(abs(v[4] / v[6])) ** 2)
 
+def in_the_box(program):
+    """A bound of a ratio, moments over mass, is linear times mass."""
+    low = plain().values[1] + 2.0 * plain().std[1]
+    program.AddLinearConstraint([1.0], low, 0.1, of="center_of_mass.x")
+    return "Clarabel", [lambda v: v[1] - low], lambda v: 0.0
+
+
+def same_about_two_axes(program):
+    """Linear in values that are no ratios goes to a nonlinear program."""
+    program.AddLinearConstraint([1.0, -1.0], 0.0, 0.0, of=["inertia.xx", "inertia.yy"])
+    rules = [lambda v: (v[4] - v[5]) / 0.02, lambda v: (v[5] - v[4]) / 0.02]
+    return "SNOPT", rules, lambda v: 0.0
+
+
+def nonlinear(program):
     program.AddCost(round_about, name="round")
+    return "SNOPT", [], round_about
+
+
+@pytest.mark.parametrize("add", [in_the_box, same_about_two_axes, nonlinear])
+def test_own_terms_end_where_scipy_does(add):
+    program = made()
+    solver, rules, cost = add(program)
     found = program.Solve(outliers=False)
-    other, cost = by_scipy(found, round_about)
+    assert found.program.solver == solver
+    other, least = by_scipy(found, cost, rules)
     assert np.max(np.abs(found.values - other) / plain().std) < LOCAL
-    assert found.program.cost + found.program.own_costs["round"] == pytest.approx(cost, rel=1e-5)
+    own = sum(found.program.own_costs.values())
+    assert found.program.cost + own == pytest.approx(least, rel=1e-5)
     assert np.max(np.abs(found.values - plain().values) / plain().std) > 0.5
+    assert all(rule(found.values) > -1e-5 for rule in rules)
+    assert np.linalg.eigvalsh(pseudo_inertia(found.model.inertial()))[0] > 0.0
 
 
 def test_outliers_count_less_with_own_terms_too():
@@ -153,21 +144,17 @@ def test_friction_is_linear_in_the_vector():
     assert program.values("C2.*").names == ("C2.coulomb", "C2.viscous", "C2.static")
 
 
-def test_forms_are_the_values_that_users_read():
-    """Ratios of linear forms, for all groups at once, and where one is for all cables."""
+@pytest.mark.parametrize("common", [(), ("stiffness", "damping", "friction")])
+def test_values_are_those_of_the_model(common):
+    """All groups at once, and where one is for all cables."""
+    model = believed(offset=np.full(8, 0.03), retardation=np.full(8, 2e-3))
     unknown = (*PLATFORM, "stiffness", "damping", "friction", "static_friction")
-    for common in ((), ("stiffness", "damping", "friction")):
-        program = IdentificationProgram(believed(), unknown, common=common)
-        layout, theta = program.layout, believed().vector()
-        read = layout.values(theta)
-        assert len(layout.ratios()) == len(read)
-
-        def at(form, theta=theta):
-            return sum(f * (1.0 if k < 0 else theta[k]) for k, f in form.items())
-
-        for form, value in zip(layout.ratios(), read, strict=True):
-            if form is not None:
-                assert at(form[0]) / at(form[1]) == pytest.approx(value, rel=1e-12)
+    layout = IdentificationProgram(model, unknown, common=common).layout
+    one = 1 if common else 8
+    each = model.stiffness[:one], model.retardation[:one], model.offset, model.coulomb[:one]
+    expected = [[model.mass], model.center_of_mass, model.inertia, *each, model.viscous[:one]]
+    expected = np.concatenate([*expected, model.static])
+    np.testing.assert_allclose(layout.values(model.vector()), expected, rtol=1e-9)
 
 
 def test_own_terms_that_no_robot_keeps_are_said():

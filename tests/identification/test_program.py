@@ -3,13 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.solvers import Solve
-from scipy.stats import chi2
 
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.identification.program import IdentificationProgram
 from cdpr_drake.identification.regressor import pseudo_inertia
 from cdpr_drake.identification.samples import sample_motion, sample_winches
-from cdpr_drake.identification.smoothing import Smoother
 from tests.identification.logs import BANDWIDTH, CABLES, RATE, TRUE, believed, log, samples
 
 PLATFORM = ("mass", "center_of_mass", "inertia")
@@ -32,23 +30,10 @@ def noisy():
 def test_an_exact_log_gives_the_body_back():
     made = program(samples(span=4.0))
     found = made.Solve()
-    typical = np.array([p[3] for p in made.layout.parameters()])
+    typical = np.array([p.size for p in made.layout.parameters])
     off = (found.values - made.layout.values(TRUE.vector())) / typical
     assert np.max(np.abs(off)) < EXACT
     assert found.status == "optimal"
-
-
-def test_errors_are_as_large_as_the_covariance_says():
-    """Ten parameters over six seeds; the study has a hundred."""
-    total, count = 0.0, 0
-    for seed in range(6):
-        made = program(samples(seed=seed, span=4.0, **NOISE))
-        found = made.Solve()
-        e = found.values - made.layout.values(TRUE.vector())
-        total, count = total + e @ np.linalg.solve(found.covariance, e), count + len(e)
-        assert found.spread == pytest.approx(1.0, abs=0.15)
-    low, high = chi2.ppf([1e-4, 1 - 1e-4], count)
-    assert low < total < high
 
 
 def test_drakes_solver_finds_the_same(noisy):
@@ -68,8 +53,8 @@ def test_what_no_body_has_is_not_found():
     rough = samples(turn=0.05, span=4.0, tension=3.0, place=1e-4, angle=2e-4)
     made = program(rough)
     made.AddPrior("inertia", 0.034)
-    free = made._least_squares(False)
-    assert np.linalg.eigvalsh(pseudo_inertia(free.theta[:10]))[0] < 0.0
+    free = made.equations.least_squares(made.terms, False)
+    assert np.linalg.eigvalsh(pseudo_inertia(free.point.theta[:10]))[0] < 0.0
     found = made.Solve(outliers=False)
     assert np.linalg.eigvalsh(pseudo_inertia(found.model.inertial()))[0] > -1e-7
     assert "pseudo-inertia" in found.active[0]
@@ -116,40 +101,26 @@ def test_a_log_without_rotation_says_what_it_cannot_tell():
     made = program(samples(turn=0.0, span=4.0, **NOISE))
     with pytest.raises(IdentificationError, match=r"inertia .* cannot be told.*no rotation"):
         made.Solve()
-    words = " ".join(made.FindUnidentifiable())
-    assert "inertia xx" in words
-    assert "mass cannot" not in words
+    assert "mass cannot" not in " ".join(made.FindUnidentifiable())
+    at_rest = program(samples(turn=0.0, move=0.0, span=4.0, **NOISE))
+    assert "centre of mass along z" in " ".join(at_rest.FindUnidentifiable())
 
 
-def test_a_log_at_rest_says_that_there_is_no_rotation():
-    made = program(samples(turn=0.0, move=0.0, span=4.0, **NOISE))
-    assert "centre of mass along z" in " ".join(made.FindUnidentifiable())
-
-
-def stretched(noise=0.0):
-    """Unstrained lengths, as winches of elastic cables count them, beside a motion."""
-    soft = replace(
-        TRUE, stiffness=np.linspace(3000.0, 5000.0, 8), retardation=np.full(8, 4e-3),
-        offset=np.linspace(-0.02, 0.02, 8),
-    )  # fmt: skip
-    of = samples(**NOISE) if noise else samples()
+def stretched(of, stiffness):
+    """Unstrained lengths, as winches of elastic cables count them, and the cables."""
+    T, EA = np.full(8, 4e-3), stiffness
+    soft = replace(TRUE, stiffness=EA, retardation=T, offset=np.linspace(-0.02, 0.02, 8))
     first, second = of.tension_rates
-    T, EA = soft.retardation, soft.stiffness
     y = of.tensions - T * first + T**2 * second
     # l = l0 (1 + y / EA) + offset, solved for what is counted.
-    counted = (of.lengths - soft.offset) / (1.0 + y / EA)
-    return soft, of, counted
+    return soft, (of.lengths - soft.offset) / (1.0 + y / EA)
 
 
 @pytest.mark.parametrize("common", [(), ("stiffness", "damping")])
 def test_stiffness_and_damping_of_cables(common):
-    soft, of, counted = stretched()
-    if common:
-        soft = replace(soft, stiffness=np.full(8, 4000.0))
-        first, second = of.tension_rates
-        y = of.tensions - 4e-3 * first + 4e-3**2 * second
-        counted = (of.lengths - soft.offset) / (1.0 + y / 4000.0)
-    start = believed(stiffness=np.full(8, 8000.0), retardation=np.full(8, 1e-3))
+    of = samples()
+    soft, counted = stretched(of, np.full(8, 4000.0) if common else np.linspace(3000.0, 5000.0, 8))
+    start = believed(stiffness=np.linspace(7000.0, 9000.0, 8), retardation=np.full(8, 1e-3))
     made = IdentificationProgram(start, ("stiffness", "damping"), common=common)
     made.AddCableLengths(of, counted)
     found = made.Solve()
@@ -159,12 +130,12 @@ def test_stiffness_and_damping_of_cables(common):
     assert len(found.names) == (10 if common else 24)
 
 
-def test_noisy_stiffness_is_within_what_is_said_of_it():
-    soft, of, counted = stretched(noise=1.0)
-    made = IdentificationProgram(believed(stiffness=np.full(8, 8000.0)), ("stiffness",))
-    made.layout.model.retardation[:] = soft.retardation
+def test_noisy_stiffness_is_within_what_is_said_of_it(noisy):
+    soft, counted = stretched(noisy, np.linspace(3000.0, 5000.0, 8))
+    start = believed(stiffness=np.full(8, 8000.0), retardation=soft.retardation)
+    made = IdentificationProgram(start, ("stiffness",))
     counted = counted + 5e-5 * np.random.default_rng(5).standard_normal(counted.shape)
-    made.AddCableLengths(of, counted)
+    made.AddCableLengths(noisy, counted)
     found = made.Solve()
     off = (found.model.stiffness - soft.stiffness) / found.std[:8]
     assert np.sqrt(np.mean(off**2)) < 2.0
@@ -174,7 +145,7 @@ SMOOTHED = 5e-3
 """What smoothing at 6 Hz leaves of friction of winches that turn at a third of a hertz."""
 
 
-def winding(excess=0.0, noise=2e-3):
+def winding(excess, noise):
     """Winches that turn to and fro with friction, and torques that overcome it."""
     random, time = np.random.default_rng(2), np.arange(0.0, 8.0, 1.0 / RATE)
     ratio, J = np.full(2, 0.004), 3e-5
@@ -191,27 +162,16 @@ def winding(excess=0.0, noise=2e-3):
     return sample_winches(time, l0, t, torques, ratio=ratio, inertia=J, **how), coulomb, viscous
 
 
-def test_friction_without_noise_has_no_bias():
-    """Means over stretches are of what friction depends on, not of the speed alone."""
-    kept, coulomb, viscous = winding(0.01, 0.0)
-    A = np.column_stack([np.sign(kept.speed), np.sign(kept.speed) * kept.excess, kept.speed])
-    of_the_mean = np.exp(-np.abs(kept.speed) / 5.0)
-    for i in range(2):
-        mine = kept.cable == i
-        found = np.linalg.lstsq(A[mine], kept.friction[mine], rcond=None)[0]
-        np.testing.assert_allclose(found, [coulomb[i], 0.01, viscous[i]], rtol=SMOOTHED)
-        assert np.max(kept.excess[mine] - of_the_mean[mine]) > 2.0 * SMOOTHED
-
-
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
 @pytest.mark.parametrize("unknown", [("friction",), ("friction", "static_friction")])
-def test_friction_of_winches(unknown):
-    excess = 0.01
-    kept, coulomb, viscous = winding(excess)
-    start = believed()
+def test_friction_of_winches(unknown, noise):
+    """Means over stretches are of what friction depends on, not of the speed alone."""
+    excess, start, half = 0.01, believed(), np.array([0.1, 0.1])
+    kept, coulomb, viscous = winding(excess, noise)
     two = replace(
         start, names=("C1", "C2"), stiffness=start.stiffness[:2], offset=np.zeros(2),
-        retardation=start.retardation[:2], coulomb=np.array([0.1, 0.1]),
-        static=np.array([0.1, 0.1]) + excess, viscous=np.zeros(2), stribeck_speed=5.0,
+        retardation=start.retardation[:2], coulomb=half, static=half + excess,
+        viscous=np.zeros(2), stribeck_speed=5.0,
     )  # fmt: skip
     made = IdentificationProgram(two, unknown)
     made.AddWinches(kept)
@@ -219,13 +179,9 @@ def test_friction_of_winches(unknown):
     for name, true in (("coulomb", coulomb), ("viscous", viscous), ("static", coulomb + excess)):
         std = np.array([s for n, s in zip(found.names, found.std, strict=True) if name in n])
         if len(std):
-            assert np.all(np.abs(getattr(found.model, name) - true) < 4.0 * std), name
+            off = np.abs(getattr(found.model, name) - true)
+            assert np.all(off < (4.0 * std if noise else SMOOTHED * true)), name
             assert np.all(std < 0.2 * true), name
-
-
-def test_a_bandwidth_beyond_the_rows_is_refused():
-    with pytest.raises(IdentificationError, match=r"bandwidth: found 100 Hz; accepted: above 0"):
-        Smoother.over(np.arange(0.0, 2.0, 1.0 / RATE), 100.0)
 
 
 @pytest.mark.parametrize(
@@ -235,13 +191,9 @@ def test_a_bandwidth_beyond_the_rows_is_refused():
         (("weight",), (), "found 'weight'"),
         (("mass",), ("mass",), "common: found mass"),
         (("stiffness", "damping"), ("damping",), "both or neither"),
+        (("mass",), (), "measurements: found none"),
     ],
 )
 def test_impossible_requests_are_refused(unknown, common, words):
     with pytest.raises(IdentificationError, match=words):
-        IdentificationProgram(believed(), unknown, common=common)
-
-
-def test_nothing_measured_is_refused():
-    with pytest.raises(IdentificationError, match="measurements: found none"):
-        IdentificationProgram(believed(), ("mass",)).Solve()
+        IdentificationProgram(believed(), unknown, common=common).Solve()

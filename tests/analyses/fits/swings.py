@@ -16,10 +16,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.analysis import Simulator
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import FreeMotionTask, FreeSigmas, fit_free_motion
+from cdpr_drake.analyses.fits.swings import swing_log, swinging_robot
 from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.identification.swings import SwingSigmas, SwingTask, fit_swings
 from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import HysteresisSettings
@@ -136,7 +137,7 @@ def write(path, runs=(0, 1), lengths=None):
 # Swings that tell behaviours of cables, of which many seeds are counted.
 
 COUNT, RATE = 60, 50.0
-NOISE = FreeSigmas(turn=0.002, position=0.001, tension=0.5)
+NOISE = SwingSigmas(turn=0.002, position=0.001, tension=0.5)
 TURNING = np.array([1.5, -1.0, 2.5])
 """Angular velocity of the push [rad/s]."""
 
@@ -198,8 +199,10 @@ def noisy(poses, tensions, random):
 def fitted(robot, unknown, log):
     """A fit of the whole log."""
     whole = ((0.0, (COUNT - 1) / RATE),)
-    task = FreeMotionTask(robot=robot, unknown=unknown, stretches=whole, sigmas=NOISE, start=START)
-    return fit_free_motion(task, log)
+    task = SwingTask(
+        robot=swinging_robot(robot), unknown=unknown, stretches=whole, sigmas=NOISE, start=START
+    )
+    return fit_swings(task, swing_log(robot, log))
 
 
 def identified(group, seed):
@@ -213,10 +216,9 @@ def identified(group, seed):
 
 def off_by(true, motion):
     """By how many standard errors parameters are off that should be these."""
-    by_name = {
-        u.name: (x, s) for u, x, s in zip(motion.unknowns, motion.values, motion.std, strict=True)
-    }
-    return np.array([(by_name[name][0] - value) / by_name[name][1] for name, value in true.items()])
+    sigmas = dict(zip([u.name for u in motion.unknowns], motion.std, strict=True))
+    found = motion.model.by_name(motion.values)
+    return np.array([(found[name] - value) / sigmas[name] for name, value in true.items()])
 
 
 def main():
@@ -227,23 +229,21 @@ def main():
     parser.add_argument("--group", choices=[*TRUE, "all"], default="all")
     options = parser.parse_args()
     for group in TRUE if options.group == "all" else [options.group]:
-        began, rows, spreads, unsettled = clock.process_time(), [], [], 0
+        began, rows, spreads = clock.process_time(), [], []
         for seed in range(options.first, options.first + options.seeds):
             motion = identified(group, seed)
             rows.append(off_by(TRUE[group], motion))
             spreads.append(motion.spread)
-            unsettled += any("before it settled" in words for words in motion.remarks)
             print(f"{group} {seed}: {motion.steps} steps, {np.round(rows[-1], 2)}", flush=True)
         print(
             f"{group}: {len(rows)} seeds, {clock.process_time() - began:.0f} s of processor; "
-            f"residuals {np.mean(spreads):.3f} sigma; {unsettled} not settled"
+            f"residuals {np.mean(spreads):.3f} sigma"
         )
         for name, column in zip(TRUE[group], np.array(rows).T, strict=True):
             print(
                 f"  {name}: {np.mean(np.abs(column) < WITHIN):.0%} within {WITHIN:g} sigma, mean "
                 f"chi-square {np.mean(column**2):.2f}, mean {np.mean(column):+.2f}, farthest "
-                f"{np.max(np.abs(column)):.2f}",
-                flush=True,
+                f"{np.max(np.abs(column)):.2f}"
             )
 
 

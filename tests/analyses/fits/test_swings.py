@@ -7,26 +7,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.calibration.free_motion import SMALL, steps_within
-from cdpr_drake.analyses.calibration.free_motion_balance import PULL, PULLED, unexplained
-from cdpr_drake.analyses.calibration.free_motion_model import (
-    FREE_GROUPS,
-    FreeMotionModel,
-    usually_bent,
+from cdpr_drake.analyses.fits.swings import (
+    dominant_frequency,
+    identify_swings,
+    swing_log,
+    swinging_robot,
+    swung_robot,
 )
-from cdpr_drake.analyses.calibration.free_motion_samples import cut, recorded_turns
-from cdpr_drake.analyses.calibration.free_motion_sensor import (
-    earlier,
-    sensed_tensions,
-    unsensed_tensions,
-)
-from cdpr_drake.analyses.calibration.free_motion_start import StartCoordinates
-from cdpr_drake.analyses.fits.swings import dominant_frequency, identify_swings, swung_robot
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import IdentificationError, StoppedError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import cross_matrix, pose_row
+from cdpr_drake.identification.swing_log import cut
+from cdpr_drake.identification.swing_model import FREE_GROUPS, SwingModel, earlier, usually_bent
+from cdpr_drake.identification.swing_prediction import PULL, PULLED, unexplained
+from cdpr_drake.identification.swing_states import StartCoordinates
+from cdpr_drake.identification.swings import SMALL, steps_within
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from tests.analyses.fits import swings
@@ -106,14 +103,13 @@ def test_a_held_out_swing_is_predicted(identified):
     assert one["turn_rms_rad"] < PREDICTED_TURN
     assert one["position_rms_m"] < PREDICTED_PLACE
     assert one["frequencies"]
-    for each in one["frequencies"]:
-        assert abs(each["off"]) < FREQUENCY_TOLERANCE
+    assert all(abs(each["off"]) < FREQUENCY_TOLERANCE for each in one["frequencies"])
     # The model as it was believed has other modes; what was found has the true ones.
     assert abs(said["modes_before_hz"][0] / said["modes_hz"][0] - 1.0) > 0.02
 
 
 def model_of(*groups, robot=None, lengths=False):
-    return FreeMotionModel.of(robot or soft(), START, groups, lengths, False)
+    return SwingModel.of(swinging_robot(robot or soft()), START, groups, lengths, False)
 
 
 def changed(model, values):
@@ -222,13 +218,13 @@ BENT = np.array([-0.8, 0.7, -0.9])
 
 def swing(model, vector):
     """A noisy log of a swing from where elastic cables of these lengths hold the platform."""
-    l0, cables = model.lengths(vector), model.robot.cable_set()
+    l0, cables = model.lengths(vector), model.robot.cables
     rest = equilibrium_near(cables, ELASTIC, model.platform(vector), l0, START).X_WP
     turn = Rotation.from_matrix((rest.rotation() @ START.rotation().inverse()).matrix())
     shift = rest.translation() - START.translation()
     moved = [turn.as_rotvec(), shift, swings.push(rest, cables), BENT[: model.memory]]
     states, tensions = model.run(vector, np.concatenate(moved), COUNT, 1.0 / RATE)
-    cells = sensed_tensions(model, vector, tensions)
+    cells = model.sensed_tensions(vector, tensions)
     return swings.noisy(states, cells, np.random.default_rng(0))
 
 
@@ -247,7 +243,7 @@ def test_what_the_plant_swung_with_is_found(group):
     check_found(swings.TRUE[group], motion)
     by_name = {one.name: x for one, x in zip(motion.unknowns, motion.values, strict=True)}
     assert ("rests beside its pose" in " ".join(motion.remarks)) == (group == "hysteresis")
-    robot = swung_robot(motion)
+    robot = swung_robot(soft(), motion)
     rubs, does = robot.platform.hysteresis, robot.cable_behaviour()
     assert (rubs is not None) == (group == "hysteresis")
     if rubs is not None:  # the file holds what was found, and a fit begins there
@@ -266,13 +262,12 @@ def test_scale_and_zeros_of_load_cells_are_found():
     motion = swings.fitted(soft(), groups, swing(model, changed(model, true)))
     check_found(true, motion)
     assert "rests beside its pose" not in " ".join(motion.remarks)
-    assert swung_robot(motion).platform.hysteresis is None
+    assert swung_robot(soft(), motion).platform.hysteresis is None
 
 
 def test_no_behaviour_is_unknown_unless_it_is_named():
     model = model_of(*FREE_GROUPS)
-    assert not {name for name in model.names if "hysteresis" in name or "creep" in name}
-    assert "all.stiffening" not in model.names
+    assert {u.group for u in model.unknowns} == {*FREE_GROUPS, "", "sensor"}
     assert model.first() == pytest.approx(np.zeros(len(model.names)))
 
 
@@ -302,16 +297,16 @@ def test_what_load_cells_tell_goes_back_to_tensions():
     model = model_of("load_cells", "load_cell_zeros")
     vector = model.before() + 0.3 * np.arange(len(model.names))
     pulls = np.array([[40.0, 50.0, 60.0, 0.0]])
-    cells = sensed_tensions(model, vector, pulls)
-    np.testing.assert_allclose(unsensed_tensions(model, vector, cells), pulls, atol=1e-12)
+    cells = model.sensed_tensions(vector, pulls)
+    np.testing.assert_allclose(model.unsensed_tensions(vector, cells), pulls, atol=1e-12)
     assert cells[0, 3] == pytest.approx(model.by_name(vector)["C4.load_cell_zero"])
 
 
 def test_what_is_known_beforehand_weighs_and_counts():
-    known = model_of(*FREE_GROUPS).knowing({"mass": 0.1})
-    (mass,) = [one for one in known.unknowns if one.group == "mass"]
-    assert (mass.size, mass.known) == (0.1, True)
-    assert [one.known for one in known.unknowns].count(True) == 1
+    known = model_of(*FREE_GROUPS).knowing({"mass": 0.1}).unknowns
+    assert [(u.name, u.size) for u in known if u.prior] == [("mass", 0.1)]
+    with pytest.raises(IdentificationError, match=r"priors: mass: found -1; accepted: > 0 \[kg\]"):
+        model_of(*FREE_GROUPS).knowing({"mass": -1.0})
 
 
 def test_a_swing_tells_masses_and_forces_only_beside_what_load_cells_tell():
@@ -326,7 +321,7 @@ def test_a_swing_tells_masses_and_forces_only_beside_what_load_cells_tell():
     (states, pulls), (again, other) = (model.run(v, moved, 30, 0.02) for v in (vector, heavier))
     np.testing.assert_allclose(again, states, atol=1e-9)
     assert np.max(other) > 1.05 * np.max(pulls)
-    cells = [sensed_tensions(model, v, t) for v, t in ((vector, pulls), (heavier, other))]
+    cells = [model.sensed_tensions(v, t) for v, t in ((vector, pulls), (heavier, other))]
     np.testing.assert_allclose(cells[1], cells[0], atol=1e-6)
 
 
@@ -342,7 +337,7 @@ WEIGHT = 12.992 * 9.80665
 
 
 def stretch_of(model, log):
-    return cut(model.robot, log, recorded_turns(log), [(0.0, (COUNT - 1) / RATE)])[0]
+    return cut(model.robot, swing_log(soft(), log), [(0.0, (COUNT - 1) / RATE)])[0]
 
 
 @pytest.fixture(scope="module")
@@ -357,10 +352,25 @@ def pulls_on(model, vector, stretch):
     return unexplained(model, vector, stretch, np.tile(START.translation(), (stretch.count, 1)))
 
 
-def test_nothing_pulls_at_a_platform_that_swings_freely(free):
-    rest = pulls_on(*free[:3])
+@pytest.mark.parametrize("lengths", [False, True], ids=["tracker", "lengths"])
+def test_nothing_pulls_at_a_platform_that_swings_freely(free, lengths):
+    """Positions are a tracker's, or those by cable lengths."""
+    model, vector, stretch, log = free
+    if lengths:
+        model = model_of(*FREE_GROUPS, lengths=True)
+        turns = Rotation.from_quat(np.array([pose_row(X) for X in log.poses])[:, [1, 2, 3, 0]])
+        log = replace(log, poses=None, tilts=turns.as_euler("ZYX")[:, ::-1])
+        vector, stretch = model.before(), stretch_of(model, log)
+    rest = pulls_on(model, vector, stretch)
     assert rest.largest(rest.force)[0] < PULLED * WEIGHT
     assert rest.largest(rest.moment)[0] < PULLED * WEIGHT * 0.3
+    assert rest.time[-1] - rest.time[0] > PULL
+
+
+def test_another_mass_shows_as_its_weight(free):
+    model, vector, stretch, _ = free
+    rest = pulls_on(model, vector + (np.array(model.names) == "mass"), stretch)
+    assert rest.largest(rest.force)[0] == pytest.approx(9.80665, rel=0.3)  # and noise
 
 
 def test_a_hand_shows_when_it_pulls_and_how_much(free):
@@ -373,29 +383,12 @@ def test_a_hand_shows_when_it_pulls_and_how_much(free):
     assert stretch.time[20] - 0.1 < at < stretch.time[49] + 0.1
     # The hand holds against the cable, whose wrench is -J^T t.
     X = log.poses[35]
-    by_cable = HAND * cable_paths(X, model.robot.cable_set()).J[0]
-    arm = X.rotation().matrix() @ model.robot.center_of_mass()
+    by_cable = HAND * cable_paths(X, model.robot.cables).J[0]
+    arm = X.rotation().matrix() @ model.robot.platform.p_PCo
     middle = slice(30 - 4, 40 - 4)  # without the four instants at the beginning
     np.testing.assert_allclose(np.mean(rest.force[middle], axis=0), by_cable[3:], atol=0.15 * HAND)
     moment = by_cable[:3] - np.cross(arm, by_cable[3:])
     np.testing.assert_allclose(np.mean(rest.moment[middle], axis=0), moment, atol=0.4)
-
-
-def test_another_mass_shows_as_its_weight(free):
-    model, vector, stretch, _ = free
-    heavier = vector + (np.array(model.names) == "mass")
-    rest = pulls_on(model, heavier, stretch)
-    assert rest.largest(rest.force)[0] == pytest.approx(9.80665, rel=0.3)  # and noise
-
-
-def test_positions_may_be_those_by_cable_lengths(free):
-    model, _, _, log = free
-    alone = model_of(*FREE_GROUPS, robot=model.robot, lengths=True)
-    turns = Rotation.from_quat(np.array([pose_row(X) for X in log.poses])[:, [1, 2, 3, 0]])
-    tilted = replace(log, poses=None, tilts=turns.as_euler("ZYX")[:, ::-1])
-    rest = pulls_on(alone, alone.before(), stretch_of(alone, tilted))
-    assert rest.largest(rest.force)[0] < PULLED * WEIGHT
-    assert rest.time[-1] - rest.time[0] > PULL
 
 
 def test_it_is_unknown_without_all_tensions(free):
@@ -417,7 +410,8 @@ def test_it_is_unknown_without_all_tensions(free):
         ("--stretches 0:90", "stretch: found 0:90; accepted: 0.5 s or more within 0 to 2.39 s"),
         ("--unknown friction", "unknown: found 'friction'; accepted of a free"),
         ("--lead -1", "--lead: found -1; accepted: > 0 [s]"),
-        ("--prior turn=1", "--prior: found 'turn'; accepted: of what is"),
+        ("--prior turn=1", "--prior: found 'turn'; accepted: of what is unknown, mass"),
+        ("--unknown stiffness --prior mass=0.1", "found 'mass'; accepted: of what is unknown, st"),
         ("--sigma turns=1", "--sigma: found 'turns'; did you mean turn?"),
     ],
 )
@@ -427,19 +421,6 @@ def test_what_cannot_be_is_said_in_one_line(tmp_path, capsys, options, words):
     said = refuse(capsys, "identify-swings", "irma4u", log, *options.split(), "--out", out)
     assert words in said
     assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("groups", "priors", "words"),
-    [
-        (FREE_GROUPS, {"masses": 1.0}, "priors: found 'masses'; accepted: of what is unknown, ma"),
-        (FREE_GROUPS, {"mass": -1.0}, r"priors: mass: found -1; accepted: > 0 \[kg\]"),
-        (("stiffness",), {"mass": 0.1}, "found 'mass'; accepted: of what is unknown, st"),
-    ],
-)
-def test_priors_of_what_is_not_unknown_are_refused(groups, priors, words):
-    with pytest.raises(IdentificationError, match=words):
-        model_of(*groups).knowing(priors)
 
 
 def test_winches_that_turn_and_a_mass_without_tensions_are_refused(tmp_path):
