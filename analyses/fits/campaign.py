@@ -48,7 +48,6 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measurements import simulated_corners
@@ -381,10 +380,11 @@ def calibrate_campaign(
         calibration = calibrated(scene, recorded, follow.doing)
         return _campaign_fit(scene, recorded, calibration, propose, follow)
 
-    arguments = plain({
-        "verb": "calibrate_campaign", "scenario": loaded, "poses": goals or count,
+    arguments = {
+        "verb": "calibrate_campaign", "scenario": loaded, "robot": scene.robot,
+        "believed": scene.nominal, "pinhole": scene.pinhole, "poses": goals or count,
         "propose": propose,
-    })  # fmt: skip
+    }  # fmt: skip
     return kept_fit(f"campaign-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 

@@ -105,10 +105,7 @@ def identify(
         outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
     arguments = {
-        "verb": "identify", "robot": loaded.name, "log": str(fitted.path),
-        "validate": None if other is None else str(other.path), "tracker_late": tracker_late,
-        "bandwidth": bandwidth,
-        **{name: value for name, value in vars(task).items() if name != "robot"},
+        **vars(task), "verb": "identify", "log": fitted, "validate": other, "bandwidth": bandwidth,
     }  # fmt: skip
 
     def work() -> Fit:

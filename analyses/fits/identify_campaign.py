@@ -43,7 +43,7 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
 from cdpr_drake.analyses.runs.log import Log, column_names
-from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import (
@@ -167,7 +167,13 @@ def identify_campaign(
     """
     loaded = campaign_scenario(scenario, TensionScenario, "a scenario of tension_control")
     groups = group_names(unknown)
-    arguments = plain({"verb": "identify_campaign", "scenario": loaded, "unknown": groups})
+    file = loaded.perturbations.believed_robot
+    arguments = {
+        **TensionRun(loaded).arguments(),
+        "verb": "identify_campaign",
+        "unknown": groups,
+        "believed": None if file is None else load_robot(file),
+    }
 
     def work() -> Fit:
         return _campaign_fit(simulate_campaign(loaded, groups, follow))

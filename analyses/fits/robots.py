@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.analyses.fits.fit import fitted_robot
+from cdpr_drake.analyses.fits.fit import Fit, fitted_robot
 from cdpr_drake.analyses.fits.poses import schema_pose
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError
+from cdpr_drake.models.robot_exchange import Deviations, export_robot, with_comment
+from cdpr_drake.models.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_schema import CameraMount, Robot
+
+MACHINE = "machine"
+"""Name of a results folder's file for the machine's own configuration, without its ending."""
 
 
 def calibration_model(robot: Robot, mount: str | None = None) -> CalibrationModel:
@@ -97,3 +104,50 @@ def calibrated_robot(
         left.append("zeros of tilts and the tracker's clock belong to the log, as well")
     changes = {"cables": cables, "cameras": cameras, "winch": winch}
     return fitted_robot(robot, "Calibrated", result.status, result.names, **changes), tuple(left)
+
+
+def with_machine_lines(fit: Fit, format: str) -> Fit:
+    """A calibration with its robot as lines of a firmware's configuration, deviations as comments.
+
+    Args:
+        fit: The calibration.
+        format: A name of `FIRMWARES`.
+
+    Raises:
+        RobotFileError: The format cannot hold the robot.
+    """
+    robot, lost = fit.model, export_omissions(fit.model, format)
+    ((name, text),) = export_robot(robot, format, cable_deviations(robot, fit.result)).items()
+    verdict = "" if fit.fits else ", which does not fit what was measured: do not use it"
+    text = with_comment(text, f"Of a calibration: {fit.status}{verdict}.")
+    file = f"{MACHINE}{Path(name).suffix}"
+    words = (f"Configuration for {format}, in {file}:", text.rstrip(), *omission_words(lost))
+    machine = {"format": format, "file": file, "text": text, "not_written": lost}
+    more = fit.with_more(details={"machine": machine}, texts={file: text})
+    return replace(more, words=(*fit.words, *words))
+
+
+def cable_deviations(robot: Robot, result: CalibrationResult) -> list[Deviations]:
+    """Standard deviations of points and drums of all cables."""
+    names = {name: k for k, name in enumerate(result.names)}
+
+    def std(weights: Mapping[str, float]) -> float:
+        """Of a weighted sum of parameters; NaN if none of them was fitted."""
+        sums = np.zeros(len(names))
+        for name, weight in weights.items():
+            if name in names:
+                sums[names[name]] = weight
+        return float(np.sqrt(sums @ result.covariance @ sums)) if sums.any() else np.nan
+
+    share = robot.winch.drum_radius / len(robot.cables)  # of a mean of scales, see above
+    scales = {f"{cable.name}.length_scale": share for cable in robot.cables}
+    return [
+        Deviations(
+            np.array([
+                std({f"{name}.exit_point.{axis}": 1.0, f"{name}.anchor_point.{axis}": -1.0})
+                for axis in "xyz"
+            ]),
+            std({f"{name}.drum_radius": 1.0, "common_drum_radius": 1.0, **scales}),
+        )
+        for name in (cable.name for cable in robot.cables)
+    ]  # fmt: skip

@@ -1,6 +1,7 @@
 """`calibrate`, `identify` and `calibrate-camera`: what they write and say, and what they refuse."""
 
 import json
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -30,11 +31,13 @@ from tests.analyses.fits.logs import (
     TAGS,
     TRUE,
     length_columns,
+    pushed_columns,
     tracked_columns,
     write_motion,
 )
-from tests.cli.commands import ended, refuse, run, told, write_log
+from tests.cli.commands import answer, ended, refuse, run, told, write_log
 from tests.identification import logs as motions
+from tests.models.formats.foreign_files import KLIPPER, MASLOW, REPRAP
 from tests.vision.boards import board_image, board_poses, make_board
 
 # Robots from trackers, cameras, winches and a recorded series.
@@ -176,6 +179,39 @@ def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
     assert held["fitted_rows"] == [k for k in range(1, 45) if k not in rows]
     assert held["distance_largest_m"] < 0.02
     assert (here / "out" / "rows.png").exists()
+
+
+LINES = {
+    "maslow.yaml": ("tlX: {}\n", "    # tlX: standard deviation "),
+    "config.g": ("A{}:", "; A x: standard deviation "),
+    "printer.cfg": ("anchor_x: {}\n", "# anchor_x: standard deviation "),
+}
+"""A coordinate of the first cable in files of firmwares, and the comment on it."""
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_owners_get_lines_for_their_configuration(here, capsys, name):
+    """What is fitted comes back from the file; a robot by another file is asked for it."""
+    content = {"maslow.yaml": MASLOW, "config.g": REPRAP, "printer.cfg": KLIPPER}[name]
+    (here / name).write_text(content)
+    believed = load_robot(name)
+    write_log(here / "log.csv", pushed_columns(believed))
+    said = told(capsys, "calibrate", name, "log.csv", "--out", "out")
+    machine = said["machine"]
+    text = (here / "out" / machine["file"]).read_text()
+    assert text == machine["text"]
+    fitted, again = load_robot("out/robot.yaml"), load_robot(f"out/{machine['file']}")
+    for cable, other in zip(fitted.cables, again.cables, strict=True):
+        np.testing.assert_allclose(other.exit_point, cable.exit_point, atol=1e-12)
+    line, comment = LINES[name]
+    change, first = said["parameters"][0]["change"], believed.cables[0].exit_point[0]
+    assert line.format(1e3 * (first + change)) in text
+    assert f"{comment}{1e3 * said['parameters'][0]['std']:.2g} mm\n" in text
+    assert "Of a calibration: converged." in text
+    words = answer(capsys, "calibrate", "out/robot.yaml", "log.csv", "--export", machine["format"])
+    assert f"Configuration for {machine['format']}, in {machine['file']}:" in words
+    assert "not written: " in words
+    assert comment in words
 
 
 # Masses, inertia and friction from a motion.
@@ -355,3 +391,47 @@ def test_what_gives_no_camera_is_refused(images, tmp_path, capsys):
         command = ("calibrate-camera", *files, *BOARD, *more, "--out", tmp_path / "no")
         assert words in refuse(capsys, *command)
         assert not (tmp_path / "no").exists()
+
+
+# A complete fit and its own command.
+
+
+def again(capsys, command, out, file):
+    """The command twice more: without one of its figures, and with another input.
+
+    Numbers are read again, among them the processor time of the first command.
+    """
+    picture = next(out.glob("*.png"))
+    picture.unlink()
+    said = told(capsys, *command, "--out", out)
+    assert said == json.loads((out / "results.json").read_text())
+    assert picture.exists()
+    assert answer(capsys, *command, "--out", out).count("results: ") == 1
+    content = file.read_bytes()
+    changed = content + b"\n" if file.suffix == ".png" else content[: content.rfind(b"\n", 0, -1)]
+    file.write_bytes(changed)
+    assert f"{out.name}: holds other results: " in refuse(capsys, *command, "--out", out)
+    file.write_bytes(content)
+    return said
+
+
+def test_a_complete_calibration_answers_its_own_command(here, tracked, capsys):
+    write_log(here / "log.csv", tracked)
+    command = (*CALIBRATE[:3], *SIGMA, "--unknown", "exit_points")
+    first = told(capsys, *command, "--out", "out")
+    assert again(capsys, command, here / "out", here / "log.csv") == first
+
+
+def test_a_complete_identification_answers_its_own_command(here, motion_logs, capsys):
+    log, other = (here / name for name in ("a.csv", "b.csv"))
+    for path, source in zip((log, other), motion_logs, strict=True):
+        path.write_text(Path(source).read_text())
+    command = (*IDENTIFY[:3], log, "--validate", other)
+    first = told(capsys, *command, "--out", "out")
+    assert again(capsys, command, here / "out", other) == first
+
+
+def test_a_complete_camera_answers_its_own_command(images, calibrated, capsys):
+    out, numbers = calibrated
+    command = ("calibrate-camera", *images, *BOARD)
+    assert again(capsys, command, out, Path(images[3])) == numbers

@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.fits import campaign as fits_campaign
 from cdpr_drake.analyses.fits import identify_campaign
 from cdpr_drake.analyses.fits.campaign import (
     Scene,
@@ -17,6 +19,7 @@ from cdpr_drake.analyses.fits.campaign import (
 )
 from cdpr_drake.analyses.fits.dynamics import IdentificationTask, fit_dynamics
 from cdpr_drake.analyses.fits.poses import rest_poses
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
@@ -25,6 +28,9 @@ from cdpr_drake.errors import CalibrationError, CdprError, OutputFolderError, Sc
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
+
+COMMAND = Follow(results=Path("runs"))
+"""Of a command: results in a folder are read again."""
 
 # Calibration.
 
@@ -50,7 +56,7 @@ def test_a_campaign_with_slack_cables_and_one_tag_makes_the_robot_better(campaig
     assert calibration.result.spread() < 1.5
 
 
-def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
+def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path, monkeypatch):
     scenario, out = load_scenario("acrobot_pbvs_line", CHANGES), tmp_path / "out"
     fit = calibrate_campaign(scenario, poses=8, propose=3, folder=out)
     said = json.loads((out / "results.json").read_text())
@@ -63,8 +69,13 @@ def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
     assert {path.stem for path in out.glob("*.png")} == {"calibration", "correlation"}
     assert not (out / "inputs.json").exists()  # the robot that was found is no file of the user
     assert "calibrated" in repr(fit)
-    with pytest.raises(OutputFolderError, match="add overwrite"):
-        calibrate_campaign(scenario, poses=8, folder=out)
+    with pytest.raises(OutputFolderError, match="poses is 8 there, 9 here"):
+        calibrate_campaign(scenario, poses=9, propose=3, folder=out)
+    with monkeypatch.context() as patch:
+        patch.delattr(fits_campaign, "record")
+        again = calibrate_campaign(scenario, poses=8, propose=3, folder=out, follow=COMMAND)
+    assert json.loads(json.dumps(again.as_dict())) == said
+    assert repr(again) == repr(fit)
 
 
 def test_a_campaign_goes_where_it_is_sent(campaign):
@@ -137,6 +148,14 @@ def test_it_is_written_and_shows_itself(identified):
     assert load_robot(str(folder / "robot.yaml")).platform.mass == fit.model.platform.mass
     with pytest.raises(CdprError, match="found 'trackin'; did you mean tracking"):
         fit.plot("trackin")
+
+
+def test_it_is_read_again(identified, monkeypatch):
+    folder, fit, said = identified
+    monkeypatch.delattr(identify_campaign, "simulate_campaign")
+    again = identify_campaign.identify_campaign(fit.source.scenario, folder=folder, follow=COMMAND)
+    assert json.loads(json.dumps(again.as_dict())) == said
+    assert repr(again) == repr(fit)
 
 
 def test_the_true_robot_tracks_as_well_with_what_was_found(identified):
