@@ -13,6 +13,8 @@ from cyclopts import Parameter
 from cdpr_drake.analyses.fits.fit import (
     MISFIT,
     Fit,
+    Groups,
+    Priors,
     Unknown,
     group_names,
     kept_fit,
@@ -60,7 +62,6 @@ from cdpr_drake.analyses.frame.words import (
     PoseWord,
     RobotWord,
     Switch,
-    comma_words,
     named_values,
     one_of,
     pose,
@@ -118,7 +119,6 @@ HomeOrPose = Annotated[
 ImageSize = Annotated[
     tuple[int, int] | None, words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT")
 ]
-Unknowns = Annotated[str | Sequence[str] | None, comma_words()]
 NextCount = Annotated[int | None, whole(1, MOST_NEXT, "COUNT", "--next")]
 
 
@@ -147,8 +147,7 @@ class Calibration:
 
 @verb()
 def calibrate(
-    robot: RobotWord, log: InputFile, *, unknown: Unknowns = None,
-    priors: Annotated[Values, named_values(name="--prior")] = None,
+    robot: RobotWord, log: InputFile, *, unknown: Groups | None = None, priors: Priors = None,
     sigmas: Annotated[Values, named_values([f.name for f in fields(Sigmas)], "--sigma")] = None,
     bounds: Annotated[Values, named_values(name="--bound")] = None,
     tag_size: float | None = None, tags: InputFile = None, mount: str | None = None,

@@ -27,9 +27,14 @@ from cdpr_drake.analyses.fits.calibration import (
     with_next_poses,
 )
 from cdpr_drake.analyses.fits.fit import Fit, kept_fit
-from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
 from cdpr_drake.analyses.fits.prediction import FRAMES_KNOWN
-from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
+from cdpr_drake.analyses.fits.robots import (
+    calibration_model,
+    find_mount,
+    in_short_hops,
+    rest_poses,
+    schema_pose,
+)
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
@@ -58,7 +63,6 @@ from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError, ScenarioError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
-from cdpr_drake.geometry.poses import place_error
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -209,12 +213,6 @@ class Record:
     goals: list[RigidTransform]
     first: Array
     remarks: tuple[str, ...]
-
-    @property
-    def misses(self) -> Array:
-        """Distances of the platform from where it was sent, shape (k,) [m]."""
-        pairs = zip(self.poses, self.goals, strict=True)
-        return np.array([place_error(X, Y) for X, Y in pairs])
 
 
 def record(scene: Scene, goals: Sequence[RigidTransform]) -> Record:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydrake.common.yaml import yaml_dump_typed
@@ -17,6 +17,7 @@ from pydrake.common.yaml import yaml_dump_typed
 from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.words import comma_words, named_values
 from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
@@ -46,6 +47,13 @@ MISFIT_FACTOR = 3.0
 
 LATE = 0.25
 """A clock is off by more than this share of the time between rows."""
+
+
+Groups = Annotated[str | Sequence[str], comma_words()]
+"""Groups of parameters, and names."""
+
+Priors = Annotated[Mapping[str, float] | None, named_values(name="--prior")]
+"""Standard deviations known beforehand, by group or name."""
 
 
 @dataclass(frozen=True)

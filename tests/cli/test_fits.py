@@ -280,39 +280,6 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(here, capsys):
         assert word in words
 
 
-def still():
-    return motion(turn=0.0, move=0.0)
-
-
-def four_cables():
-    time, poses, tensions = motion()
-    return time, poses, tensions[:, :4]
-
-
-def late():
-    time, poses, tensions = motion()
-    return time, poses[np.maximum(np.arange(len(time)) - 30, 0)], tensions
-
-
-@pytest.mark.parametrize(
-    ("log", "options", "words"),
-    [
-        (still, "", "cannot be told"),
-        (four_cables, "", "tensions: found none of C5, C6, C7, C8"),
-        (late, "", "tracker: found it 0.12"),
-        (motion, "--unknown weight", "--unknown: found 'weight'"),
-        (motion, "--bandwidth 0", "--bandwidth: found 0 Hz"),
-        (motion, "--unknown stiffness", "cable lengths: found none"),
-        (motion, "--unknown friction", "motor torques: found none"),
-        (motion, "--prior weight=1", "--prior: found 'weight'"),
-    ],
-)
-def test_logs_and_requests_that_cannot_identify_end_with_2(here, capsys, log, options, words):
-    path = write_motion(here / "log.csv", *log())
-    assert words in refuse(capsys, *IDENTIFY, path, *options.split())
-    assert not (here / "out").exists()
-
-
 # Cameras from drawn images.
 
 K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])

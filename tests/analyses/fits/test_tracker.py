@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
-from cdpr_drake.analyses.fits.poses import rest_poses
 from cdpr_drake.analyses.fits.prediction import next_poses
-from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.robots import calibration_model, rest_poses
 from cdpr_drake.analyses.fits.tags import TagPlace, read_tags
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.calibration.guesses import with_tags
