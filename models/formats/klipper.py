@@ -77,10 +77,10 @@ def read_klipper(path: Path) -> RobotDraft:
     draft.home_position = np.zeros(3)
     radii, ratios = [radius for radius, _ in drums], {ratio for _, ratio in drums}
     if len(ratios) == 1 and (len(set(radii)) == 1 or len(radii) == len(draft.cables)):
-        draft.drum_radius, draft.gear_ratio = drums[0]
-        if len(set(radii)) > 1:
-            for cable, radius in zip(draft.cables, radii, strict=True):
-                cable.drum_radius = radius
+        usual = max(radii, key=radii.count)
+        draft.drum_radius, draft.gear_ratio = usual, ratios.pop()
+        for cable, radius in zip(draft.cables, radii, strict=False):
+            cable.drum_radius = None if radius == usual else radius
     elif drums:
         draft.remarks.append("Gears differ from winch to winch, for which there is no place here.")
     speed = parser.get("printer", "max_velocity", fallback=None)
