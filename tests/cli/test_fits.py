@@ -317,6 +317,7 @@ def test_images_become_a_camera_that_scenarios_take(calibrated):
     assert values["fx"] == pytest.approx(520.0, rel=FOCAL)
     assert values["fy"] == pytest.approx(518.0, rel=FOCAL)
     assert all(row["std"] > 0.0 for row in numbers["parameters"])
+    assert [row["unit"] for row in numbers["parameters"]] == ["px"] * 4 + ["-"] * 5
     assert numbers["fitted_rms_px"] < 0.3
     assert numbers["held_out_rms_px"] < 0.5
     assert [row["role"] for row in numbers["images"]].count("held out") == 2

@@ -145,7 +145,10 @@ def test_it_is_written_and_shows_itself(identified):
     assert json.loads(json.dumps(fit.as_dict())) == said
     assert {path.stem for path in folder.glob("*.png")} == {"validation", "parameters", "tracking"}
     assert "Tracking of acrobot_computed_torque" in repr(fit)
-    assert load_robot(str(folder / "robot.yaml")).platform.mass == fit.model.platform.mass
+    robot = load_robot(str(folder / "robot.yaml"))
+    assert robot.platform.mass == fit.model.platform.mass
+    stiffness = [u.value for u in fit.unknowns if u.name.endswith("stiffness")]
+    np.testing.assert_allclose(robot.stiffness(), stiffness, rtol=1e-9)
     with pytest.raises(CdprError, match="found 'trackin'; did you mean tracking"):
         fit.plot("trackin")
 
