@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.formats.assumptions import CompletedDraft, complete_draft
 from cdpr_drake.models.formats.caspr_writer import write_caspr
@@ -111,6 +113,18 @@ def import_robot(
     return ImportedRobot(parse_robot(completed.yaml(), path), path, draft.tool, completed)
 
 
+class Deviations(NamedTuple):
+    """Standard deviations of a cable that was fitted, NaN where something was not.
+
+    Attributes:
+        point: Of its exit point less its anchor point along each axis of W, shape (3,) [m].
+        radius: Of its drum's radius [m].
+    """
+
+    point: Array
+    radius: float
+
+
 def draft_robot(robot: Robot) -> RobotDraft:
     """A robot as the writers of other formats take it."""
     lower, upper = robot.tension_limits()
@@ -158,12 +172,15 @@ def _layers(robot: Robot) -> dict[str, float] | None:
     return {"turns": layers.turns, "height": height, "wound": layers.wound}
 
 
-def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
+def export_robot(
+    robot: Robot | str | Path, format: str, deviations: Sequence[Deviations] = ()
+) -> dict[str, str]:
     """Files of a robot in the format of another tool.
 
     Args:
         robot: The robot, or its name or path.
         format: A name of `EXPORTS`.
+        deviations: Of all cables, for comments in files of `FIRMWARES`; none in a turned world.
 
     Returns:
         Text of each file, by its name. In a turned world, as `world_turn` says, a comment at their
@@ -177,15 +194,15 @@ def export_robot(robot: Robot | str | Path, format: str) -> dict[str, str]:
     check_format(format)
     turn, words = gravity_turn(robot), world_turn(robot, format)
     if turn is None or not words:
-        return _written(robot, format)
+        return _written(robot, format, deviations)
     try:
         files = _written(turned_robot(robot, turn), format)
     except RobotFileError as problem:
         raise RobotFileError(f"{problem}, in the world that {words[10:]}") from problem
-    return {name: _with_comment(text, words) for name, text in files.items()}
+    return {name: with_comment(text, words) for name, text in files.items()}
 
 
-def _with_comment(text: str, words: str) -> str:
+def with_comment(text: str, words: str) -> str:
     """A file with a comment at its top, in XML below the line that says what it is."""
     if not text.startswith("<"):
         return f"{';' if text.startswith(';') else '#'} {words}\n{text}"
@@ -193,7 +210,7 @@ def _with_comment(text: str, words: str) -> str:
     return f"{head}{line}<!-- {words} -->\n{body}"
 
 
-def _written(robot: Robot, format: str) -> dict[str, str]:
+def _written(robot: Robot, format: str, deviations: Sequence[Deviations] = ()) -> dict[str, str]:
     """Files of a robot whose gravity the format can hold."""
     _check_held(robot, format)
     draft, name = draft_robot(robot), robot.name
@@ -202,6 +219,8 @@ def _written(robot: Robot, format: str) -> dict[str, str]:
         draft.cables, names_in_file([cable.name for cable in draft.cables], format), strict=True
     ):
         cable.name = word
+    for cable, std in zip(draft.cables, deviations, strict=False):
+        cable.point_std, cable.radius_std = std
     if format == "caspr":
         return {f"{name}_{part}.xml": text for part, text in write_caspr(draft).items()}
     if format == "wcrfx":
@@ -224,7 +243,7 @@ def _written(robot: Robot, format: str) -> dict[str, str]:
     return {f"{name}.sdf": write_sdformat(draft, for_drake=format == "sdf-drake")}
 
 
-_FIRMWARES = {"klipper": ("3T", 3, 26), "reprapfirmware": ("3T", 3, 9), "maslow": ("2T", 4, 4)}
+FIRMWARES = {"klipper": ("3T", 3, 26), "reprapfirmware": ("3T", 3, 9), "maslow": ("2T", 4, 4)}
 """Motion types of firmwares, and how many cables they have."""
 
 
@@ -234,8 +253,8 @@ def _check_held(robot: Robot, format: str) -> None:
     if robot.axis is not None:
         found += f" with axis {np.round(robot.axis, 6).tolist()}"
     accepted, m = "", len(robot.cables)
-    if format in _FIRMWARES:
-        kind, least, most = _FIRMWARES[format]
+    if format in FIRMWARES:
+        kind, least, most = FIRMWARES[format]
         level = motion.axis in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
         if robot.motion != kind or not least <= m <= most or (kind == "2T" and not level):
             found += f", {m} cables"

@@ -71,7 +71,7 @@ HELD: dict[str, set[str]] = {
     "caspr": _COMMON | _CENTER | _HOME | _PULLEYS | _LIMITS
     | {"title", "plane_height", "frame.lower", "frame.upper"},
     "gazebo-yaml": _COMMON | _CENTER | _BOX | _HOME | _FRAME | _LIMITS | {"cable.diameter"},
-    "klipper": _ANCHORS | {"winch.drum_radius", "winch.gear_ratio"},
+    "klipper": _ANCHORS | {"winch.drum_radius", "winch.gear_ratio", "cables[].drum_radius"},
     "reprapfirmware": _ANCHORS | _LIMITS | {"platform.mass", "winch.drum_radius",
                                             "winch.gear_ratio", "cables[].drum_radius",
                                             "cables[].mechanical_advantage"},

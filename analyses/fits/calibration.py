@@ -13,6 +13,8 @@ from cyclopts import Parameter
 from cdpr_drake.analyses.fits.fit import (
     MISFIT,
     Fit,
+    Groups,
+    Priors,
     Unknown,
     group_names,
     kept_fit,
@@ -28,7 +30,7 @@ from cdpr_drake.analyses.fits.prediction import (
     predicted,
 )
 from cdpr_drake.analyses.fits.rest_log import at_rest
-from cdpr_drake.analyses.fits.robots import calibrated_robot
+from cdpr_drake.analyses.fits.robots import calibrated_robot, with_machine_lines
 from cdpr_drake.analyses.fits.setup import (
     HOMING,
     CalibrationTask,
@@ -60,21 +62,23 @@ from cdpr_drake.analyses.frame.words import (
     PoseWord,
     RobotWord,
     Switch,
-    comma_words,
     named_values,
+    one_of,
     pose,
     whole,
     whole_pair,
     words,
 )
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.calibration.result import CalibrationResult, Outlier
 from cdpr_drake.errors import CalibrationError, accepted_names
 from cdpr_drake.geometry.poses import pose_row
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.formats.file_kinds import firmware_of
+from cdpr_drake.models.robot_exchange import FIRMWARES, export_robot
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
@@ -115,7 +119,6 @@ HomeOrPose = Annotated[
 ImageSize = Annotated[
     tuple[int, int] | None, words(_image_size, "width x height, as 640x480 [px]", "WIDTHxHEIGHT")
 ]
-Unknowns = Annotated[str | Sequence[str] | None, comma_words()]
 NextCount = Annotated[int | None, whole(1, MOST_NEXT, "COUNT", "--next")]
 
 
@@ -144,14 +147,14 @@ class Calibration:
 
 @verb()
 def calibrate(
-    robot: RobotWord, log: InputFile, *, unknown: Unknowns = None,
-    priors: Annotated[Values, named_values(name="--prior")] = None,
+    robot: RobotWord, log: InputFile, *, unknown: Groups | None = None, priors: Priors = None,
     sigmas: Annotated[Values, named_values([f.name for f in fields(Sigmas)], "--sigma")] = None,
     bounds: Annotated[Values, named_values(name="--bound")] = None,
     tag_size: float | None = None, tags: InputFile = None, mount: str | None = None,
     image_size: ImageSize = None, start: PoseWord = None, zero: HomeOrPose = None,
     rest: bool | None = None, tracker_late: float | None = None, hold_out: str | None = None,
-    keep_outliers: Switch = False, propose: NextCount = None, folder: OutFolder = None,
+    keep_outliers: Switch = False, propose: NextCount = None,
+    export: Annotated[str | None, one_of(FIRMWARES)] = None, folder: OutFolder = None,
     overwrite: Switch = False, formats: Formats = DEFAULT_FORMATS,
     follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
 ) -> Fit:  # fmt: skip
@@ -197,6 +200,8 @@ def calibrate(
         keep_outliers: Count every measurement as it is.
         propose: Also propose so many poses that would tell most next, in next_poses.csv, which cdpr
             plan --path and cdpr calibrate-campaign --poses-from take.
+        export: Also write the robot as lines of a firmware's configuration, with standard
+            deviations; default: if the robot's file is one.
         folder: Results folder; default: a new one below runs/; in Python nothing is kept.
         overwrite: Replace other results in the folder.
         formats: Formats of the figures' files.
@@ -226,6 +231,10 @@ def calibrate(
     )  # fmt: skip
     if propose is not None and not 1 <= propose <= MOST_NEXT:
         raise CalibrationError(f"propose: found {propose}; accepted: 1 to {MOST_NEXT}")
+    if export is not None:
+        export_robot(loaded, export)  # refuses robots that it cannot hold
+    elif isinstance(robot, str | Path):
+        export = firmware_of(Path(robot))
 
     def work() -> Fit:
         try:
@@ -235,12 +244,15 @@ def calibrate(
                 problem.add_note(UNKNOWN_ZERO)
             raise
         fit = calibration_fit(calibration)
+        if export is not None:
+            fit = with_machine_lines(fit, export)
         return fit if propose is None else with_next_poses(fit, propose, follow.doing)
 
-    arguments = plain({
-        **vars(task), "verb": "calibrate", "robot": loaded.name, "log": str(log.path),
-        "rows": log.count, "tracker_late": tracker_late, "hold_out": hold_out, "propose": propose,
-    })  # fmt: skip
+    cameras = [load_camera(camera.model) for camera in loaded.cameras] if log.corners else []
+    arguments = {
+        **vars(task), "verb": "calibrate", "cameras": cameras, "hold_out": hold_out,
+        "propose": propose, "export": export,
+    }  # fmt: skip
     return kept_fit(f"calibrate-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from cyclopts import Parameter
 
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, kept_fit, notes_table
+from cdpr_drake.analyses.fits.fit import CAMERA, Fit, Unknown, kept_fit, notes_table
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -44,9 +44,6 @@ from cdpr_drake.vision.lens_distortion import COEFFICIENTS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-CAMERA = "camera.yaml"
-"""File of a results folder: the camera, as robots and scenarios take it."""
 
 ROLES = {"fitted": ".", "held out": "x", "outlier": "^"}
 """Roles of images in a fit, and their marks in its figure."""
@@ -177,7 +174,8 @@ def _identity(image: Path | str | np.ndarray) -> str:
     """What tells one image from another among the arguments of a results folder."""
     if isinstance(image, np.ndarray):
         return hashlib.sha256(np.ascontiguousarray(image).tobytes()).hexdigest()
-    return str(image)
+    content = Path(image).read_bytes() if Path(image).is_file() else b""
+    return f"{image} {hashlib.sha256(content).hexdigest()}"
 
 
 def _camera(fit: CameraFit, name: str, source: str, rate: float) -> Camera:

@@ -26,9 +26,14 @@ from cdpr_drake.analyses.fits.calibration import (
     with_next_poses,
 )
 from cdpr_drake.analyses.fits.fit import Fit, kept_fit
-from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses, schema_pose
 from cdpr_drake.analyses.fits.prediction import FRAMES_KNOWN
-from cdpr_drake.analyses.fits.robots import calibration_model, find_mount
+from cdpr_drake.analyses.fits.robots import (
+    calibration_model,
+    find_mount,
+    in_short_hops,
+    rest_poses,
+    schema_pose,
+)
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.fits.tags import TagPlace
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
@@ -47,7 +52,6 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.planning.path_files import path_poses
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.guesses import with_tags
 from cdpr_drake.calibration.measurements import simulated_corners
@@ -58,7 +62,6 @@ from cdpr_drake.calibration.program import CalibrationProgram, first_readings
 from cdpr_drake.calibration.stations import Point, Stations
 from cdpr_drake.errors import CalibrationError, EquilibriumError, ScenarioError
 from cdpr_drake.geometry.pose_accuracy import distances_from_line
-from cdpr_drake.geometry.poses import place_error
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
@@ -210,12 +213,6 @@ class Record:
     goals: list[RigidTransform]
     first: Array
     remarks: tuple[str, ...]
-
-    @property
-    def misses(self) -> Array:
-        """Distances of the platform from where it was sent, shape (k,) [m]."""
-        pairs = zip(self.poses, self.goals, strict=True)
-        return np.array([place_error(X, Y) for X, Y in pairs])
 
 
 def record(scene: Scene, goals: Sequence[RigidTransform]) -> Record:
@@ -381,10 +378,11 @@ def calibrate_campaign(
         calibration = calibrated(scene, recorded, follow.doing)
         return _campaign_fit(scene, recorded, calibration, propose, follow)
 
-    arguments = plain({
-        "verb": "calibrate_campaign", "scenario": loaded, "poses": goals or count,
+    arguments = {
+        "verb": "calibrate_campaign", "scenario": loaded, "robot": scene.robot,
+        "believed": scene.nominal, "pinhole": scene.pinhole, "poses": goals or count,
         "propose": propose,
-    })  # fmt: skip
+    }  # fmt: skip
     return kept_fit(f"campaign-{loaded.name}", arguments, work, folder, overwrite, formats, follow)
 
 

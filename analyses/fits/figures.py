@@ -74,6 +74,7 @@ def correlation_figure(fit: Fit) -> Figure:
     names = [unknown.name for unknown in fit.unknowns]
     size = max(5.0, min(14.0, 0.09 * len(names) + 3.0))
     matrix, plane = new_figure(1, 1, (size + 1.0, size), "Correlation of the unknown parameters")
+    matrix.set_layout_engine("compressed")  # the other one cuts names off beside a square
     shown = plane.imshow(fit.correlation, cmap="PuOr", vmin=-1.0, vmax=1.0)
     plane.grid(False)
     # In grey both signs look alike: negative ones bear their sign.

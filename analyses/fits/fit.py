@@ -2,31 +2,42 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder, results_folder, shown_path, write_result
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Result, Table
+from cdpr_drake.analyses.frame.words import comma_words, named_values
 from cdpr_drake.analyses.logs.measurements import Measurements, read_measurements
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.reporting.provenance import package_versions
+from cdpr_drake.analyses.reporting.provenance import code_version, package_versions
+from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
-from cdpr_drake.errors import CalibrationError, IdentificationError
+from cdpr_drake.errors import CalibrationError, CdprError, IdentificationError
+from cdpr_drake.models.camera_catalogue import load_camera
+from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.time_shift import WORSE
+from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import dump_typed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-RESULTS, ROBOT = "results.json", "robot.yaml"
-"""Files of a results folder: all numbers, and the robot as it is believed now."""
+RESULTS, ROBOT, CAMERA = "results.json", "robot.yaml", "camera.yaml"
+"""Files of a results folder: all numbers, and the robot or camera as it is believed now."""
+
+SHOWN = "shown.json"
+"""Last file that is written but figures: what the command shows of the fit, in words."""
 
 MISFIT, MISFIT_CODE = "misfit", 6
 """Status of a fit that does not explain what was measured, and the exit code of its command."""
@@ -36,6 +47,13 @@ MISFIT_FACTOR = 3.0
 
 LATE = 0.25
 """A clock is off by more than this share of the time between rows."""
+
+
+Groups = Annotated[str | Sequence[str], comma_words()]
+"""Groups of parameters, and names."""
+
+Priors = Annotated[Mapping[str, float] | None, named_values(name="--prior")]
+"""Standard deviations known beforehand, by group or name."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +100,7 @@ class Fit(Result):
         remarks: Sentences that a user should know.
         details: Further numbers for JSON, under their keys.
         shown: Its tables.
+        words: Lines below them.
         drawings: Functions that draw its figures, by name; the most telling one is first.
         texts: Further files of its results folder, by name.
         writer: Writes further files into a folder; None if there are none.
@@ -104,6 +123,7 @@ class Fit(Result):
     remarks: tuple[str, ...] = ()
     details: Mapping[str, Any] = field(default_factory=dict)
     shown: tuple[Table, ...] = ()
+    words: tuple[str, ...] = ()
     drawings: Mapping[str, Callable[[], Figure]] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
     writer: Callable[[Path], None] | None = None
@@ -158,8 +178,9 @@ class Fit(Result):
         return self.shown
 
     def lines(self) -> list[str]:
-        """Where the results are."""
-        return [] if self.folder is None else [f"results: {shown_path(self.folder)}"]
+        """Its words, and where the results are."""
+        place = [] if self.folder is None else [f"results: {shown_path(self.folder)}"]
+        return [*self.words, *place]
 
     def notes(self) -> list[str]:
         """That only figures are missing."""
@@ -172,7 +193,7 @@ class Fit(Result):
         return self.drawings
 
     def write(self, folder: Folder) -> None:
-        """Writes numbers, the fitted model and further files."""
+        """Writes numbers, the fitted model and further files, and last what `read_fit` needs."""
         folder.write_json(RESULTS, self.as_dict())
         folder.write_text(self.model_file, dump_typed(self.model))
         for name, words in self.texts.items():
@@ -180,6 +201,11 @@ class Fit(Result):
         if self.writer is not None:
             with folder.files() as stage:
                 self.writer(stage)
+        folder.write_json(SHOWN, {
+            "title": self.title, "model_file": self.model_file, "misfit": self.misfit,
+            "figures": list(self.drawings), "words": self.words,
+            "tables": [asdict(table) for table in self.shown],
+        })  # fmt: skip
 
     def with_more(
         self, tables: Sequence[Table] = (), *, details: Mapping[str, Any] | None = None,
@@ -199,9 +225,12 @@ def kept_fit(
 ) -> Fit:  # fmt: skip
     """A fit in its results folder, if one is kept.
 
+    A command whose folder holds the complete fit of the same arguments reads it, and draws figures
+    that are missing. Python computes it again, since a folder holds no `Fit.result`.
+
     Args:
         name: Name of a new folder below runs/, if none is given and `follow` keeps results.
-        arguments: All that the results depend on, for JSON.
+        arguments: All that the results depend on: logs, and what `plain` takes.
         work: Computes the fit.
         folder, overwrite, formats, follow: As of each verb.
 
@@ -209,13 +238,62 @@ def kept_fit(
         OutputFolderError: The folder holds other results or files, or cannot be written.
         StoppedError: It was stopped.
     """
-    with results_folder(f"runs/{name}", arguments, folder, overwrite, follow.results) as results:
-        fit = work()
+    name, again, compute = f"runs/{name}", folder is not None, cache(work)
+    arguments = {"cdpr_drake": code_version(), **{k: _content(v) for k, v in arguments.items()}}
+    with results_folder(name, arguments, folder, overwrite, follow.results, again) as results:
         if results is None:
-            return fit
+            return compute()
+        there = read_fit(results.path, compute)
+        fit = compute() if there is None or follow.results is None else there
         fit = replace(fit, folder=results.path)
-        write_result(fit, results, formats, follow)
+        if there is not None:
+            follow.say(f"reused the fit of {shown_path(results.path)}")
+        write_result(fit, results, formats, follow, complete=there is not None)
         return fit
+
+
+def read_fit(folder: Path, compute: Callable[[], Fit]) -> Fit | None:
+    """The fit whose numbers a folder holds, without its result; None if a file is missing.
+
+    Args:
+        folder: A results folder.
+        compute: Computes the fit, once a figure of it is drawn.
+    """
+    try:
+        numbers, shown = (
+            load_json((folder / name).read_text(encoding="utf-8")) for name in (RESULTS, SHOWN)
+        )
+        load: Callable[[str], Any] = load_camera if shown["model_file"] == CAMERA else load_robot
+        model = load(str(folder / shown["model_file"]))
+    except (OSError, ValueError, KeyError, CdprError):
+        return None
+
+    def drawn(name: str) -> Callable[[], Figure]:
+        return lambda: compute().drawings[name]()
+
+    covariance = numbers.get("covariance")
+    return Fit(
+        title=shown["title"], model=model, model_file=shown["model_file"],
+        status=numbers["status"], spread=numbers.get("residuals_over_sigma"),
+        unknowns=tuple(
+            Unknown(**{**row, "std": math.nan if row["std"] is None else row["std"]})
+            for row in numbers["parameters"]
+        ),
+        residuals=numbers.get("residuals", numbers.get("terms", {})),
+        misfit=tuple(shown["misfit"]), remarks=tuple(numbers["remarks"]),
+        covariance=None if covariance is None else np.array(covariance, float),
+        held_out=numbers.get("held_out", numbers.get("log_not_fitted")), details=numbers,
+        shown=tuple(Table(**table) for table in shown["tables"]), words=tuple(shown["words"]),
+        drawings={name: drawn(name) for name in shown["figures"]},
+    )  # fmt: skip
+
+
+def _content(value: Any) -> Any:
+    """An argument as JSON has it; a log by its path and a hash of what it holds."""
+    if not isinstance(value, Measurements):
+        return plain(value)
+    held = json.dumps(plain(vars(value)), default=str).encode()
+    return {"path": str(value.path), "sha256": hashlib.sha256(held).hexdigest()}
 
 
 def log_of(robot: Robot, log: Any, late: float | None = None) -> Measurements:

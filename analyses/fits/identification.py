@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
@@ -16,7 +16,16 @@ from cdpr_drake.analyses.fits.dynamics import (
     fit_dynamics,
     identified_robot,
 )
-from cdpr_drake.analyses.fits.fit import Fit, Unknown, group_names, kept_fit, log_of, notes_table
+from cdpr_drake.analyses.fits.fit import (
+    Fit,
+    Groups,
+    Priors,
+    Unknown,
+    group_names,
+    kept_fit,
+    log_of,
+    notes_table,
+)
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -27,8 +36,6 @@ from cdpr_drake.analyses.frame.words import (
     OutFolder,
     RobotWord,
     Switch,
-    comma_words,
-    named_values,
 )
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.identification.parameters import DynamicModel
@@ -46,15 +53,12 @@ AXES = (
     "force z [N]",
 )  # fmt: skip
 
-Groups = Annotated[str | Sequence[str], comma_words()]
-
 
 @verb()
 def identify(
     robot: RobotWord, log: InputFile, *, validate: InputFile = None, unknown: Groups = UNKNOWN,
-    common: Groups = (),
-    priors: Annotated[Mapping[str, float] | None, named_values(name="--prior")] = None,
-    bandwidth: float | None = None, sigma_lengths: float = 5e-5, pulleys: bool = True,
+    common: Groups = (), priors: Priors = None, bandwidth: float | None = None,
+    sigma_lengths: float = 5e-5, pulleys: bool = True,
     tracker_late: float | None = None, keep_outliers: Switch = False, folder: OutFolder = None,
     overwrite: Switch = False, formats: Formats = DEFAULT_FORMATS,
     follow: Annotated[Follow, Parameter(parse=False)] = NOBODY,
@@ -105,10 +109,7 @@ def identify(
         outliers=not keep_outliers, check_clock=tracker_late is None,
     )  # fmt: skip
     arguments = {
-        "verb": "identify", "robot": loaded.name, "log": str(fitted.path),
-        "validate": None if other is None else str(other.path), "tracker_late": tracker_late,
-        "bandwidth": bandwidth,
-        **{name: value for name, value in vars(task).items() if name != "robot"},
+        **vars(task), "verb": "identify", "log": fitted, "validate": other, "bandwidth": bandwidth,
     }  # fmt: skip
 
     def work() -> Fit:

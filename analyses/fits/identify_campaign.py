@@ -10,7 +10,7 @@ follows that motion again.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,14 +20,13 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.fits.campaign import BEFORE, TRUE, campaign_scenario, in_turn
 from cdpr_drake.analyses.fits.dynamics import (
-    Identification,
     IdentificationTask,
     fit_dynamics,
     identified_robot,
 )
-from cdpr_drake.analyses.fits.fit import ROBOT, Fit, group_names, kept_fit
-from cdpr_drake.analyses.fits.identification import Groups, identification_fit
-from cdpr_drake.analyses.fits.poses import schema_pose
+from cdpr_drake.analyses.fits.fit import ROBOT, Fit, Groups, group_names, kept_fit
+from cdpr_drake.analyses.fits.identification import identification_fit
+from cdpr_drake.analyses.fits.robots import schema_pose
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.frame.verb import verb
@@ -42,7 +41,7 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.analyses.reporting.exported_logs import write_columns
 from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
 from cdpr_drake.analyses.runs.log import Log, column_names
-from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import IdentificationError
 from cdpr_drake.geometry.poses import (
@@ -51,8 +50,7 @@ from cdpr_drake.geometry.poses import (
     pose_rows_distance,
     rotation_from_vector,
 )
-from cdpr_drake.identification.excitation import Excitation, ExcitationTask, design_excitation
-from cdpr_drake.identification.parameters import DynamicModel
+from cdpr_drake.identification.excitation import ExcitationTask, design_excitation
 from cdpr_drake.identification.regressor import central_parameters, six_of
 from cdpr_drake.models.materials import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
@@ -111,34 +109,6 @@ ACCELERATION = 15.0
 """Largest acceleration of cables [m/s^2]."""
 
 
-@dataclass(frozen=True, eq=False)
-class DynamicCampaign:
-    """A campaign in simulation.
-
-    Attributes:
-        scenario: The scenario whose robot was identified, and whose motion validates.
-        true, believed: The robot as it is, and as it was believed to be.
-        excitation: The motion that was fitted.
-        identification: The identification.
-        logs: The records of sensors, of "excitation" and "validation".
-        tracking: Largest and mean distance [m] and angle [rad] from the desired pose on the
-            validation motion, by the robot that is believed in.
-    """
-
-    scenario: TensionScenario
-    true: Robot
-    believed: Robot
-    excitation: Excitation
-    identification: Identification
-    logs: Mapping[str, Log]
-    tracking: Mapping[str, Mapping[str, float]]
-
-    @property
-    def truth(self) -> DynamicModel:
-        """Dynamics of the true robot."""
-        return dynamic_model(self.true)
-
-
 @verb()
 def identify_campaign(
     scenario: ScenarioWord, *, unknown: Groups = UNKNOWN, folder: OutFolder = None,
@@ -167,19 +137,26 @@ def identify_campaign(
     """
     loaded = campaign_scenario(scenario, TensionScenario, "a scenario of tension_control")
     groups = group_names(unknown)
-    arguments = plain({"verb": "identify_campaign", "scenario": loaded, "unknown": groups})
+    file = loaded.perturbations.believed_robot
+    arguments = {
+        **TensionRun(loaded).arguments(),
+        "verb": "identify_campaign",
+        "unknown": groups,
+        "believed": None if file is None else load_robot(file),
+    }
 
-    def work() -> Fit:
-        return _campaign_fit(simulate_campaign(loaded, groups, follow))
-
-    name = f"identify-campaign-{loaded.name}"
-    return kept_fit(name, arguments, work, folder, overwrite, formats, follow)
+    return kept_fit(
+        f"identify-campaign-{loaded.name}", arguments,
+        lambda: simulate_campaign(loaded, groups, follow), folder, overwrite, formats, follow,
+    )  # fmt: skip
 
 
 def simulate_campaign(
     scenario: TensionScenario, unknown: tuple[str, ...] = UNKNOWN, follow: Follow = NOBODY
-) -> DynamicCampaign:
+) -> Fit:
     """Designs an excitation, records it, identifies, validates, and tracks again.
+
+    `Fit.details` has distances from the desired pose by the robot that is believed in.
 
     Raises:
         IdentificationError: The robot is of no such kind.
@@ -204,7 +181,8 @@ def simulate_campaign(
     identification = fit_dynamics(task, excited, validation, follow.doing, BANDWIDTH)
     identified, _ = identified_robot(believed, identification.result)
 
-    def tracking(robot: Robot) -> dict[str, float]:
+    def errors(robot: Robot) -> dict[str, float]:
+        """Distances [m] and angles [rad] from the desired pose on the scenario's own motion."""
         log, failures = _track(scenario, true, robot, own, follow, "tracking")
         distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
         return {
@@ -214,54 +192,46 @@ def simulate_campaign(
         }  # fmt: skip
 
     robots = {BEFORE: believed, IDENTIFIED: identified, TRUE: true}
-    return DynamicCampaign(
-        scenario, true, believed, excitation, identification, logs,
-        in_turn(robots, tracking, follow, "Tracking"),
-    )  # fmt: skip
-
-
-def _campaign_fit(campaign: DynamicCampaign) -> Fit:
-    """The fit of a campaign, with its logs, robots, scenario, table and figure."""
-    scenario, best = campaign.scenario, campaign.excitation
+    tracking = in_turn(robots, errors, follow, "Tracking")
 
     def write(folder: Path) -> None:
         """Writes the logs."""
-        names = [cable.name for cable in campaign.true.cables]
-        for name, log in campaign.logs.items():
+        names = [cable.name for cable in true.cables]
+        for name, log in logs.items():
             columns = column_names(log, {"cables": names})
             table = np.column_stack(list(log.values())).T
             write_columns(folder / f"{name}.csv", dict(zip(columns, table, strict=True)))
 
-    tracking = Table(
+    table = Table(
         f"Tracking of {scenario.name}, not fitted",
         ("robot believed in", "largest [mm]", "mean [mm]", "largest [deg]", "mean [deg]"),
         [(who, *(f"{1e3 * row[f'{which}_m']:.3f}" for which in ("largest", "mean")),
           *(f"{np.degrees(row[f'{which}_rad']):.3f}" for which in ("largest", "mean")))
-         for who, row in campaign.tracking.items()],
+         for who, row in tracking.items()],
     )  # fmt: skip
+    motion = excitation.trajectory
     numbers = {
-        "scenario": scenario.name, "seed": scenario.seed, "tracking": campaign.tracking,
+        "scenario": scenario.name, "seed": scenario.seed, "tracking": tracking,
         "excitation": {
-            "poses": len(best.trajectory.poses) - 1, "duration_s": best.trajectory.end_time,
-            "log_det_per_time": best.score, "log_det_per_time_of_random_poses": best.first_score,
-            "condition": best.condition,
+            "poses": len(motion.poses) - 1, "duration_s": motion.end_time,
+            "log_det_per_time": excitation.score,
+            "log_det_per_time_of_random_poses": excitation.first_score,
+            "condition": excitation.condition,
         },
     }  # fmt: skip
-    fit = identification_fit(campaign.identification, campaign.truth).with_more(
-        [tracking], details={"campaign": numbers},
-        drawings={"tracking": lambda: _tracking_figure(campaign)},
+    fit = identification_fit(identification, dynamic_model(true)).with_more(
+        [table], details={"campaign": numbers},
+        drawings={"tracking": lambda: _tracking_figure(scenario.name, tracking)},
         texts={
-            TRUE_FILE: dump_typed(campaign.true),
-            BELIEVED_FILE: dump_typed(campaign.believed),
-            SCENARIO_FILE: dump_typed(_excitation_scenario(campaign)),
+            TRUE_FILE: dump_typed(true), BELIEVED_FILE: dump_typed(believed),
+            SCENARIO_FILE: dump_typed(_excitation_scenario(scenario, motion)),
         },
     )  # fmt: skip
-    return replace(fit, writer=write, source=campaign)
+    return replace(fit, writer=write)
 
 
-def _excitation_scenario(campaign: DynamicCampaign) -> TensionScenario:
+def _excitation_scenario(own: TensionScenario, motion: PoseTrajectory) -> TensionScenario:
     """The excitation as a scenario of the true robot, believed to be the identified one."""
-    motion, own = campaign.excitation.trajectory, campaign.scenario
     poses = list(map(schema_pose, motion.poses))
     trajectory = replace(
         own.trajectory, start=poses[0], pause=motion.start_time, file=None,
@@ -397,20 +367,20 @@ def _as_read(path: Path, log: Log) -> Measurements:
     )  # fmt: skip
 
 
-def _tracking_figure(campaign: DynamicCampaign) -> Figure:
+def _tracking_figure(name: str, tracking: Mapping[str, Mapping[str, float]]) -> Figure:
     """Mean and largest errors of tracking, by the robot that is believed in."""
     from cdpr_drake.analyses.frame.figures import bars, new_figure
 
     figure, panels = new_figure(
-        1, 2, (12.0, 5.0), f"Tracking of {campaign.scenario.name}, a motion that was not fitted"
+        1, 2, (12.0, 5.0), f"Tracking of {name}, a motion that was not fitted"
     )
     units = (("m", 1e3, "distance [mm]"), ("rad", 180.0 / np.pi, "angle [deg]"))
     for panel, (key, scale, label) in zip(panels, units, strict=True):
         heights = {
-            which: [scale * row[f"{which}_{key}"] for row in campaign.tracking.values()]
+            which: [scale * row[f"{which}_{key}"] for row in tracking.values()]
             for which in ("mean", "largest")
         }
-        bars(panel, list(campaign.tracking), heights)
+        bars(panel, list(tracking), heights)
         panel.set_yscale("log")
         panel.set(ylabel=label, xlabel="robot believed in")
     panels[0].legend()

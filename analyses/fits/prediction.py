@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.fits.poses import in_short_hops, rest_poses
-from cdpr_drake.analyses.fits.robots import calibrated_robot
+from cdpr_drake.analyses.fits.robots import calibrated_robot, in_short_hops, rest_poses
 from cdpr_drake.analyses.fits.setup import Setup, prepare
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.logs.measurements import Measurements, off_plane

@@ -151,7 +151,7 @@ def identify_swings(
         priors=dict(priors or {}),
     )  # fmt: skip
     arguments = {
-        "robot": loaded.name, "log": str(measured.path), "unknown": task.unknown,
+        "robot": loaded, "log": measured, "unknown": task.unknown,
         "stretches": task.stretches, "hold_out": task.held_out, "priors": task.priors,
         "sigmas": asdict(deviations), "lead": lead, "tracker_frame": tracker_frame,
         "start": None if task.start is None else task.start.GetAsMatrix34().tolist(),

@@ -353,7 +353,7 @@ def results_folder(
 
 def write_result(
     result: Any, results: Folder, formats: Sequence[str], follow: Follow,
-    pages: Mapping[str, Callable[[Path], object]] | None = None,
+    pages: Mapping[str, Callable[[Path], object]] | None = None, complete: bool = False,
 ) -> None:  # fmt: skip
     """Writes a result into a folder: numbers first, then figures, one of which spoils no other.
 
@@ -363,6 +363,7 @@ def write_result(
         formats: Formats of figures.
         follow: Who follows.
         pages: Writers of files that are drawn like figures, by name.
+        complete: True if all numbers are there: figures that are not are drawn.
 
     Raises:
         OutputFolderError: A file of numbers cannot be written.
@@ -371,8 +372,11 @@ def write_result(
     from cdpr_drake.analyses.frame.figures import figure_writers
 
     follow.doing("Writing results")
-    result.write(results)
+    if not complete:
+        result.write(results)
     writers = {**figure_writers(result.figures(), formats), **(pages or {})}
+    if complete:
+        writers = {name: w for name, w in writers.items() if not (results.path / name).exists()}
     result.failed.update(results.write_all(writers, follow.stop))
     if follow.stop():
         raise StoppedError(

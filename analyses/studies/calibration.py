@@ -19,8 +19,7 @@ from pydrake.math import RigidTransform
 from scipy.stats import chi2
 
 from cdpr_drake.analyses.fits.calibration import fit_robot
-from cdpr_drake.analyses.fits.poses import rest_poses
-from cdpr_drake.analyses.fits.robots import calibrated_robot, calibration_model
+from cdpr_drake.analyses.fits.robots import calibrated_robot, calibration_model, rest_poses
 from cdpr_drake.analyses.fits.setup import CalibrationTask, Sigmas
 from cdpr_drake.analyses.frame.figures import line_style, new_figure
 from cdpr_drake.analyses.logs.measurements import Measurements

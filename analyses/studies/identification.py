@@ -140,8 +140,8 @@ def campaign_row(seed: int) -> dict[str, Any]:
     """
     loaded = load_scenario(SCENARIO, (f"seed={seed}",))
     assert isinstance(loaded, TensionScenario)
-    run = simulate_campaign(loaded)
-    result, both = run.identification.result, run.identification
+    fit = simulate_campaign(loaded)
+    result, both, tracking = fit.result, fit.source, fit.details["campaign"]["tracking"]
     assert both.validated is not None
     fitted, validated = (
         {
@@ -153,11 +153,10 @@ def campaign_row(seed: int) -> dict[str, Any]:
     force, moment = (
         validated["identified"][name] / fitted["identified"][name] for name in MISFITS[:2]
     )
-    truth = run.truth
-    values = np.concatenate([[truth.mass], truth.center_of_mass, truth.inertia])
-    distances = [run.tracking[who]["mean_m"] for who in WHO]
+    values = np.array([unknown.true for unknown in fit.unknowns[:10]])
+    distances = [tracking[who]["mean_m"] for who in WHO]
     return {
-        "tracking_m": distances, "tracking_rad": [run.tracking[who]["mean_rad"] for who in WHO],
+        "tracking_m": distances, "tracking_rad": [tracking[who]["mean_rad"] for who in WHO],
         "misfit_fitted": fitted, "misfit_validated": validated,
         "platform": ((result.values[:10] - values) / result.std[:10]).tolist(),
         "tracking_excess": distances[1] / distances[2] - 1.0,

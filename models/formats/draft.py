@@ -30,6 +30,9 @@ class DraftCable:
             section `cable`, in SI units.
         drum_radius: Of its own drum, without cable on it [m].
         mechanical_advantage: Parts of line side by side.
+        point_std: Standard deviation of p_WA less p_PB along each axis of W, shape (3,) [m]; NaN
+            where it was not fitted.
+        radius_std: Of its drum's radius [m].
     """
 
     name: str
@@ -44,6 +47,8 @@ class DraftCable:
     material: dict[str, float] = field(default_factory=dict)
     drum_radius: float | None = None
     mechanical_advantage: float | None = None
+    point_std: Array = field(default_factory=lambda: np.full(3, np.nan))
+    radius_std: float = np.nan
 
 
 @dataclass(kw_only=True)
@@ -173,3 +178,11 @@ class RobotDraft:
     def anchor_points(self) -> Array:
         """p_PB, shape (3, m) [m]."""
         return np.array([cable.anchor_point for cable in self.cables], float).reshape(-1, 3).T
+
+
+def deviation_lines(mark: str, key: str, std: float) -> list[str]:
+    """A comment with a standard deviation [m] for a firmware's file; none where it is NaN.
+
+    It has a line of its own: FluidNC takes all up to the end of a line for a value.
+    """
+    return [f"{mark} {key}: standard deviation {1e3 * std:.2g} mm"] if np.isfinite(std) else []

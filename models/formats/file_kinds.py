@@ -54,6 +54,16 @@ def _is_foreign_yaml(text: str) -> bool:
         return False
 
 
+def firmware_of(path: Path) -> str | None:
+    """Format of `cdpr export` of a firmware's configuration; None of all other files."""
+    suffix = path.suffix.lower()
+    if suffix in FIRMWARE_SUFFIXES:
+        return "klipper" if suffix == ".cfg" else "reprapfirmware"
+    if suffix in YAML_SUFFIXES and is_foreign(path) and is_maslow(load_yaml(read_text(path))):
+        return "maslow"
+    return None
+
+
 def is_caspr(root: ET.Element) -> bool:
     """Whether the root of an XML file is one of CASPR's bodies or cables."""
     return root.tag in ("bodies_system", "links", "cables")

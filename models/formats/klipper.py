@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft, deviation_lines
 from cdpr_drake.models.formats.reading import fail, number, read_text, robot_name
 
 TOOL = "Klipper winch configuration"
@@ -52,7 +52,7 @@ def read_klipper(path: Path) -> RobotDraft:
         raise fail(path, "printer.kinematics", kind, "winch")
     draft = RobotDraft(name=robot_name(path.stem), tool=TOOL, title=f"from {path.name}")
     draft.motion = "3T"
-    drums: set[tuple[float, float]] = set()
+    drums: list[tuple[float, float]] = []
     unread: set[str] = set()
     for letter in LETTERS:
         section = f"stepper_{letter.lower()}"
@@ -69,16 +69,20 @@ def read_klipper(path: Path) -> RobotDraft:
             )
         )  # fmt: skip
         if "rotation_distance" in given:
-            drums.add(_drum(path, section, given))
+            drums.append(_drum(path, section, given))
         unread |= set(given) - _KEPT
     if len(draft.cables) < LEAST:
         found = f"{len(draft.cables)} winches"
         raise fail(path, "stepper_a, stepper_b, ...", found, f"at least {LEAST}")
     draft.home_position = np.zeros(3)
-    if len(drums) == 1:
-        draft.drum_radius, draft.gear_ratio = drums.pop()
+    radii, ratios = [radius for radius, _ in drums], {ratio for _, ratio in drums}
+    if len(ratios) == 1 and (len(set(radii)) == 1 or len(radii) == len(draft.cables)):
+        usual = max(radii, key=radii.count)
+        draft.drum_radius, draft.gear_ratio = usual, ratios.pop()
+        for cable, radius in zip(draft.cables, radii, strict=False):
+            cable.drum_radius = None if radius == usual else radius
     elif drums:
-        draft.remarks.append("Drums differ from winch to winch, for which there is no place here.")
+        draft.remarks.append("Gears differ from winch to winch, for which there is no place here.")
     speed = parser.get("printer", "max_velocity", fallback=None)
     if speed is not None:
         draft.cable_speed = MM * number(path, "printer.max_velocity", speed)
@@ -134,7 +138,7 @@ def _drum(path: Path, section: str, given: configparser.SectionProxy) -> tuple[f
 def write_klipper(draft: RobotDraft) -> str:
     """Sections of a configuration: kinematics, anchors and drums, without pins.
 
-    It holds exit points, drum radius, gear ratio and the speed of the cables, as that of the tool.
+    It holds exit points, drum radii, gear ratio and the speed of the cables, as that of the tool.
     """
     lines = [
         "# Cable winch kinematics. Pins, microsteps and max_accel are the machine's own.",
@@ -144,10 +148,14 @@ def write_klipper(draft: RobotDraft) -> str:
     ]
     for letter, cable in zip(LETTERS, draft.cables, strict=False):
         lines += ["", f"[stepper_{letter.lower()}]"]
-        if draft.drum_radius is not None:
-            lines.append(f"rotation_distance: {_mm(2.0 * np.pi * draft.drum_radius)}")
+        radius = draft.drum_radius if cable.drum_radius is None else cable.drum_radius
+        if radius is not None:
+            lines += deviation_lines("#", "rotation_distance", 2.0 * np.pi * cable.radius_std)
+            lines.append(f"rotation_distance: {_mm(2.0 * np.pi * radius)}")
             lines.append(f"gear_ratio: {draft.gear_ratio!r}:1")
-        for axis, value in zip("xyz", cable.exit_point - cable.anchor_point, strict=True):
+        point = cable.exit_point - cable.anchor_point
+        for axis, value, std in zip("xyz", point, cable.point_std, strict=True):
+            lines += deviation_lines("#", f"anchor_{axis}", std)
             lines.append(f"anchor_{axis}: {_mm(value)}")
     return "\n".join(lines) + "\n"
 

@@ -24,7 +24,7 @@ import numpy as np
 import yaml
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft, deviation_lines
 from cdpr_drake.models.formats.file_kinds import (
     MASLOW_CORNERS,
     MASLOW_SECTION,
@@ -136,15 +136,21 @@ def write_maslow(draft: RobotDraft) -> str:
     It holds exit points, from the corner of the board, and arms, whose ends belts have none of.
     """
     upright = draft.axis is not None and abs(float(draft.axis[1])) == 1.0
-    R = _R_UPRIGHT if upright else np.eye(3)
+    R, axes = (_R_UPRIGHT, [0, 2, 1]) if upright else (np.eye(3), [0, 1, 2])
     anchors: dict[str, float] = {}
+    stds: dict[str, float] = {}
     for corner, cable in zip(MASLOW_CORNERS, draft.cables, strict=True):
         point = R.T @ (cable.exit_point - cable.anchor_point) / MM
         if not upright:
             point[2] -= (draft.plane_height or 0.0) / MM
         point[2] *= -1.0
         anchors |= {f"{corner}{k}": float(x) + 0.0 for k, x in zip("XYZ", point, strict=True)}
+        stds |= zip((f"{corner}{k}" for k in "XYZ"), cable.point_std[axes], strict=True)
     if draft.arm is not None:
         anchors |= {"beltEndExtension": 0.0, "armLength": draft.arm / MM}
     content = {"Maslow_vertical": upright, "kinematics": {MASLOW_SECTION: anchors}}
-    return yaml.safe_dump(content, sort_keys=False)
+    lines: list[str] = []
+    for line in yaml.safe_dump(content, sort_keys=False).splitlines():
+        key = line.strip().partition(":")[0]
+        lines += [*deviation_lines("    #", key, stds.get(key, np.nan)), line]
+    return "\n".join(lines) + "\n"

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.models.formats.draft import DraftCable, RobotDraft
+from cdpr_drake.models.formats.draft import DraftCable, RobotDraft, deviation_lines
 from cdpr_drake.models.formats.reading import fail, number, read_text, robot_name
 
 TOOL = "RepRapFirmware Hangprinter"
@@ -215,11 +215,20 @@ def write_reprapfirmware(draft: RobotDraft) -> str:
     def same(value: float) -> str:
         return ":".join([repr(float(value))] * m)
 
+    stds = [
+        line
+        for letter, cable in zip(LETTERS, draft.cables, strict=False)
+        for axis, std in zip("xyz", cable.point_std, strict=True)
+        for line in deviation_lines(";", f"{letter} {axis}", std)
+    ]
+    for letter, cable in zip(LETTERS, draft.cables, strict=False):
+        stds += deviation_lines(";", f"R of {letter}", cable.radius_std)
     low = min(cable.lower or 0.0 for cable in draft.cables)
     high = max(cable.upper or 0.0 for cable in draft.cables)
     return (
         "; Hangprinter parameters. Steps, currents and drivers are the machine's own.\n"
-        f"M669 K6 N{m} {anchors}\n"
+        + "".join(f"{line}\n" for line in stds)
+        + f"M669 K6 N{m} {anchors}\n"
         f"M666 Q{_mm(build_up)} R{':'.join(map(_mm, radii))} "
         f"U{':'.join(str(round(n)) for n in advantages)} O{':'.join(['1'] * m)} "
         f"L{':'.join([str(motor)] * m)} H{':'.join([str(teeth)] * m)} W{draft.mass!r} "

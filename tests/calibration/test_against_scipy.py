@@ -5,8 +5,7 @@ from pydrake.math import RigidTransform
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.analyses.fits.poses import rest_poses
-from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.robots import calibration_model, rest_poses
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.program import CalibrationProgram

@@ -1,6 +1,8 @@
 """`calibrate`, `identify` and `calibrate-camera`: what they write and say, and what they refuse."""
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -30,11 +32,13 @@ from tests.analyses.fits.logs import (
     TAGS,
     TRUE,
     length_columns,
+    pushed_columns,
     tracked_columns,
     write_motion,
 )
-from tests.cli.commands import ended, refuse, run, told, write_log
+from tests.cli.commands import answer, ended, refuse, run, told, write_log
 from tests.identification import logs as motions
+from tests.models.formats.foreign_files import KLIPPER, MASLOW, REPRAP
 from tests.vision.boards import board_image, board_poses, make_board
 
 # Robots from trackers, cameras, winches and a recorded series.
@@ -154,12 +158,13 @@ def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(here, capsys):
 
 def test_what_a_robot_file_cannot_hold_is_said():
     class Result:
-        model = TRUE
+        model = replace(TRUE, length_scale=np.linspace(1.0, 1.02, 8))
         names = ("C1.length_offset", "C1.length_scale")
         status = "converged"
 
-    _, left = calibrated_robot(ROBOT, Result())
+    robot, left = calibrated_robot(ROBOT, Result())
     assert len(left) == 2
+    assert robot.winch.drum_radius == pytest.approx(1.01 * ROBOT.winch.drum_radius)
 
 
 def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
@@ -176,6 +181,39 @@ def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
     assert held["fitted_rows"] == [k for k in range(1, 45) if k not in rows]
     assert held["distance_largest_m"] < 0.02
     assert (here / "out" / "rows.png").exists()
+
+
+LINES = {
+    "maslow.yaml": ("tlX: {}\n", "    # tlX: standard deviation "),
+    "config.g": ("A{}:", "; A x: standard deviation "),
+    "printer.cfg": ("anchor_x: {}\n", "# anchor_x: standard deviation "),
+}
+"""A coordinate of the first cable in files of firmwares, and the comment on it."""
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_owners_get_lines_for_their_configuration(here, capsys, name):
+    """What is fitted comes back from the file; a robot by another file is asked for it."""
+    content = {"maslow.yaml": MASLOW, "config.g": REPRAP, "printer.cfg": KLIPPER}[name]
+    (here / name).write_text(content)
+    believed = load_robot(name)
+    write_log(here / "log.csv", pushed_columns(believed))
+    said = told(capsys, "calibrate", name, "log.csv", "--out", "out")
+    machine = said["machine"]
+    text = (here / "out" / machine["file"]).read_text()
+    assert text == machine["text"]
+    fitted, again = load_robot("out/robot.yaml"), load_robot(f"out/{machine['file']}")
+    for cable, other in zip(fitted.cables, again.cables, strict=True):
+        np.testing.assert_allclose(other.exit_point, cable.exit_point, atol=1e-12)
+    line, comment = LINES[name]
+    change, first = said["parameters"][0]["change"], believed.cables[0].exit_point[0]
+    assert line.format(1e3 * (first + change)) in text
+    assert f"{comment}{1e3 * said['parameters'][0]['std']:.2g} mm\n" in text
+    assert "Of a calibration: converged." in text
+    words = answer(capsys, "calibrate", "out/robot.yaml", "log.csv", "--export", machine["format"])
+    assert f"Configuration for {machine['format']}, in {machine['file']}:" in words
+    assert "not written: " in words
+    assert comment in words
 
 
 # Masses, inertia and friction from a motion.
@@ -244,39 +282,6 @@ def test_a_fit_that_misses_its_noise_ends_with_6_and_names_where(here, capsys):
         assert word in words
 
 
-def still():
-    return motion(turn=0.0, move=0.0)
-
-
-def four_cables():
-    time, poses, tensions = motion()
-    return time, poses, tensions[:, :4]
-
-
-def late():
-    time, poses, tensions = motion()
-    return time, poses[np.maximum(np.arange(len(time)) - 30, 0)], tensions
-
-
-@pytest.mark.parametrize(
-    ("log", "options", "words"),
-    [
-        (still, "", "cannot be told"),
-        (four_cables, "", "tensions: found none of C5, C6, C7, C8"),
-        (late, "", "tracker: found it 0.12"),
-        (motion, "--unknown weight", "--unknown: found 'weight'"),
-        (motion, "--bandwidth 0", "--bandwidth: found 0 Hz"),
-        (motion, "--unknown stiffness", "cable lengths: found none"),
-        (motion, "--unknown friction", "motor torques: found none"),
-        (motion, "--prior weight=1", "--prior: found 'weight'"),
-    ],
-)
-def test_logs_and_requests_that_cannot_identify_end_with_2(here, capsys, log, options, words):
-    path = write_motion(here / "log.csv", *log())
-    assert words in refuse(capsys, *IDENTIFY, path, *options.split())
-    assert not (here / "out").exists()
-
-
 # Cameras from drawn images.
 
 K = np.array([[520.0, 0.0, 331.2], [0.0, 518.0, 236.4], [0.0, 0.0, 1.0]])
@@ -312,6 +317,7 @@ def test_images_become_a_camera_that_scenarios_take(calibrated):
     assert values["fx"] == pytest.approx(520.0, rel=FOCAL)
     assert values["fy"] == pytest.approx(518.0, rel=FOCAL)
     assert all(row["std"] > 0.0 for row in numbers["parameters"])
+    assert [row["unit"] for row in numbers["parameters"]] == ["px"] * 4 + ["-"] * 5
     assert numbers["fitted_rms_px"] < 0.3
     assert numbers["held_out_rms_px"] < 0.5
     assert [row["role"] for row in numbers["images"]].count("held out") == 2
@@ -355,3 +361,47 @@ def test_what_gives_no_camera_is_refused(images, tmp_path, capsys):
         command = ("calibrate-camera", *files, *BOARD, *more, "--out", tmp_path / "no")
         assert words in refuse(capsys, *command)
         assert not (tmp_path / "no").exists()
+
+
+# A complete fit and its own command.
+
+
+def again(capsys, command, out, file):
+    """The command twice more: without one of its figures, and with another input.
+
+    Numbers are read again, among them the processor time of the first command.
+    """
+    picture = next(out.glob("*.png"))
+    picture.unlink()
+    said = told(capsys, *command, "--out", out)
+    assert said == json.loads((out / "results.json").read_text())
+    assert picture.exists()
+    assert answer(capsys, *command, "--out", out).count("results: ") == 1
+    content = file.read_bytes()
+    changed = content + b"\n" if file.suffix == ".png" else content[: content.rfind(b"\n", 0, -1)]
+    file.write_bytes(changed)
+    assert f"{out.name}: holds other results: " in refuse(capsys, *command, "--out", out)
+    file.write_bytes(content)
+    return said
+
+
+def test_a_complete_calibration_answers_its_own_command(here, tracked, capsys):
+    write_log(here / "log.csv", tracked)
+    command = (*CALIBRATE[:3], *SIGMA, "--unknown", "exit_points")
+    first = told(capsys, *command, "--out", "out")
+    assert again(capsys, command, here / "out", here / "log.csv") == first
+
+
+def test_a_complete_identification_answers_its_own_command(here, motion_logs, capsys):
+    log, other = (here / name for name in ("a.csv", "b.csv"))
+    for path, source in zip((log, other), motion_logs, strict=True):
+        path.write_text(Path(source).read_text())
+    command = (*IDENTIFY[:3], log, "--validate", other)
+    first = told(capsys, *command, "--out", "out")
+    assert again(capsys, command, here / "out", other) == first
+
+
+def test_a_complete_camera_answers_its_own_command(images, calibrated, capsys):
+    out, numbers = calibrated
+    command = ("calibrate-camera", *images, *BOARD)
+    assert again(capsys, command, out, Path(images[3])) == numbers

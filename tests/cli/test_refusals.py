@@ -3,6 +3,7 @@
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -10,7 +11,9 @@ from cdpr_drake.cli import app
 from cdpr_drake.errors import CdprError, accepted_names
 from cdpr_drake.models.robot_loader import robot_text
 from cdpr_drake.systems.scenarios.files import scenario_file
+from tests.analyses.fits.logs import MOTION_NOISE, write_motion
 from tests.cli.commands import refuse, run
+from tests.identification import logs as motions
 
 SERIES = Path(__file__).parents[1] / "analyses/fits/hangprinter4/samples.csv"
 
@@ -72,6 +75,8 @@ REFUSED = {
         ("--out file/below", "cannot be written"),
         (f"{QUICK} --port 7000", "--port: found alone; accepted: with --meshcat"),
         ("acrobot_computed_torque --camera projected", "--camera: found with acrobot_computed"),
+        ("acrobot_computed_torque --set perturbations.believed_robot=acrobot_large --set "
+         "predictive.steps=5", "believed_robot: found beside predictive"),
         ("--seeds 0:2 --seed 3", "--seed: found with --seeds; accepted: without"),
         ("--seeds 0:2 --video", "--video: found with --seeds; accepted: without"),
         ("--workers 2", "--workers: found without --seeds; accepted: with"),
@@ -232,6 +237,14 @@ REFUSED = {
         ("--sigma length=1", "--sigma: found 'length=1'; accepted: name=number", "lengths_share"),
         ("--prior exit_points=-1", "--prior: found 'exit_points=-1'"),
         ("--campaign acrobot_sensors", "--campaign"),
+        ("--next 0", "--next: found '0'"),
+        ("--export caspr", "--export: found 'caspr'; accepted: klipper"),
+        *((f"--zero home --hold-out {rows}", "--hold-out: found")
+          for rows in ("0", "9", "50-60", "50-99999999999", "nine", "1-9")),
+    ],
+    "calibrate acrobot_small": [
+        ("none.csv", "none.csv: found no such file"),
+        ("posed.csv --export klipper", "motion: found 3R3T, 8 cables; accepted for klipper: 3T"),
     ],
     "calibrate-camera mine.yaml --board charuco": [
         ("--squares 9x7 --size 0.03", "mine.yaml: found no image"),
@@ -244,6 +257,16 @@ REFUSED = {
         ("posed.csv", "tensions: found none"),
         ("pulled.csv", "poses: found none"),
         ("timeless.csv", "time: found none"),
+    ],
+    "identify acrobot_large --no-pulleys": [
+        ("still.csv", "cannot be told"),
+        ("four.csv", "tensions: found none of C5, C6, C7, C8"),
+        ("late.csv", "tracker: found it 0.12"),
+        ("motion.csv --unknown weight", "--unknown: found 'weight'"),
+        ("motion.csv --bandwidth 0", "--bandwidth: found 0 Hz"),
+        ("motion.csv --unknown stiffness", "cable lengths: found none"),
+        ("motion.csv --unknown friction", "motor torques: found none"),
+        ("motion.csv --prior weight=1", "--prior: found 'weight'"),
     ],
 }  # fmt: skip
 """By the words that a command begins with: the words that follow, and what is said of them."""
@@ -260,6 +283,14 @@ def folder(tmp_path_factory):
         (root / name).write_text(text)
     for name in FOLDERS:
         (root / name).mkdir()
+    motion = time, poses, tensions = motions.log(span=4.0, **MOTION_NOISE)
+    late = poses[np.maximum(np.arange(len(time)) - 30, 0)]
+    logs = {
+        "motion": motion, "four": (time, poses, tensions[:, :4]), "late": (time, late, tensions),
+        "still": motions.log(span=4.0, turn=0.0, move=0.0, **MOTION_NOISE),
+    }  # fmt: skip
+    for name, log in logs.items():
+        write_motion(root / f"{name}.csv", *log)
     hung = yaml.safe_load(robot_text("caroca"))
     hung["name"], hung["cables"] = "hung", [hung["cables"][0], hung["cables"][4]]
     del hung["slack_readings"]

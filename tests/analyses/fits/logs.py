@@ -1,5 +1,6 @@
 """Simulated logs of winches, swivel angles and trackers: as arrays, and as files for commands."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -102,6 +103,26 @@ def tracked_columns(seed, poses=POSES, tracked=None):
     readings = simulated_lengths(TRUE, poses, START, 1e-4, random)
     at = poses if tracked is None else tracked
     return length_columns(readings) | pose_columns(simulated_poses(at, 1e-3, 5e-4, random))
+
+
+def pushed_columns(believed):
+    """Lengths and positions of a point mass whose exit points were pushed aside by 10 mm."""
+    random, moves = np.random.default_rng(0), believed.motion == "3T"
+    aside = 0.01 * random.standard_normal((len(believed.cables), 3)) * (1.0 if moves else [1, 0, 1])
+    cables = [
+        replace(cable, exit_point=cable.exit_point + step)
+        for cable, step in zip(believed.cables, aside, strict=True)
+    ]
+    corners = np.array([cable.exit_point for cable in believed.cables])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    places = low + random.uniform(0.1, 0.7, (30, 3)) * (high - low)
+    if not moves:
+        places[:, 1] = believed.home.position[1]
+    at = [pose_from_angles(place, np.zeros(3)) for place in places]
+    lengths = numbers(calibration_model(replace(believed, cables=cables)), at)[:, :, 0]
+    lengths = lengths + 1e-3 * random.standard_normal(lengths.shape)
+    names = [f"{cable.name}_length_m" for cable in believed.cables]
+    return dict(zip([*names, "x_m", "y_m", "z_m"], [*lengths.T, *places.T], strict=True))
 
 
 def write_motion(path, time, poses, tensions):

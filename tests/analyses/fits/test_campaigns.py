@@ -2,10 +2,12 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cdpr_drake.analyses.fits import campaign as fits_campaign
 from cdpr_drake.analyses.fits import identify_campaign
 from cdpr_drake.analyses.fits.campaign import (
     Scene,
@@ -16,15 +18,19 @@ from cdpr_drake.analyses.fits.campaign import (
     record,
 )
 from cdpr_drake.analyses.fits.dynamics import IdentificationTask, fit_dynamics
-from cdpr_drake.analyses.fits.poses import rest_poses
+from cdpr_drake.analyses.fits.robots import rest_poses
+from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.planning.path_files import read_path
-from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE, write_run_inputs
+from cdpr_drake.analyses.reporting.provenance import BELIEVED_FILE
 from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.errors import CalibrationError, CdprError, OutputFolderError, ScenarioError
+from cdpr_drake.errors import CalibrationError, CdprError, OutputFolderError
+from cdpr_drake.geometry.poses import place_error
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.diagrams.beliefs import believed_robot
 from cdpr_drake.systems.diagrams.load import load_scenario
+
+COMMAND = Follow(results=Path("runs"))
+"""Of a command: results in a folder are read again."""
 
 # Calibration.
 
@@ -40,17 +46,22 @@ def campaign():
     return scene, recorded, calibrated(scene, recorded)
 
 
+def misses(recorded):
+    """Distances of the platform from where it was sent [m]."""
+    return list(map(place_error, recorded.poses, recorded.goals))
+
+
 def test_a_campaign_with_slack_cables_and_one_tag_makes_the_robot_better(campaign):
     scene, recorded, calibration = campaign
     assert np.isnan(recorded.log.lengths).any()  # slack cables tell nothing
-    assert 0 < np.max(recorded.misses) < 0.1
+    assert 0 < np.max(misses(recorded)) < 0.1
     errors = point_errors(scene, calibration)
     assert errors["exit_points_before_m"] == pytest.approx(0.01)
     assert errors["exit_points_after_m"] < 0.006
     assert calibration.result.spread() < 1.5
 
 
-def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
+def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path, monkeypatch):
     scenario, out = load_scenario("acrobot_pbvs_line", CHANGES), tmp_path / "out"
     fit = calibrate_campaign(scenario, poses=8, propose=3, folder=out)
     said = json.loads((out / "results.json").read_text())
@@ -63,8 +74,13 @@ def test_the_servo_believes_what_was_found_and_all_is_written(tmp_path):
     assert {path.stem for path in out.glob("*.png")} == {"calibration", "correlation"}
     assert not (out / "inputs.json").exists()  # the robot that was found is no file of the user
     assert "calibrated" in repr(fit)
-    with pytest.raises(OutputFolderError, match="add overwrite"):
-        calibrate_campaign(scenario, poses=8, folder=out)
+    with pytest.raises(OutputFolderError, match="poses is 8 there, 9 here"):
+        calibrate_campaign(scenario, poses=9, propose=3, folder=out)
+    with monkeypatch.context() as patch:
+        patch.delattr(fits_campaign, "record")
+        again = calibrate_campaign(scenario, poses=8, propose=3, folder=out, follow=COMMAND)
+    assert json.loads(json.dumps(again.as_dict())) == said
+    assert repr(again) == repr(fit)
 
 
 def test_a_campaign_goes_where_it_is_sent(campaign):
@@ -72,7 +88,7 @@ def test_a_campaign_goes_where_it_is_sent(campaign):
     goals = recorded.poses[:7]
     again = record(scene, goals)
     assert again.log.count <= len(goals)
-    assert np.max(again.misses) < 0.1
+    assert np.max(misses(again)) < 0.1
     with pytest.raises(CalibrationError, match="accepted: at least 6, of more poses"):
         record(scene, goals[:2])
 
@@ -82,15 +98,6 @@ def test_the_first_pose_follows_from_the_lengths_and_errors_that_remain_stay(cam
     assert scenario.perturbations.exit_points == 0.0
     believed = scenario.perturbations.initial_pose.position
     assert np.linalg.norm(believed - campaign[0].scenario.initial_pose.position) < 0.05
-
-
-def test_a_run_keeps_the_robot_that_was_believed(tmp_path):
-    scenario = load_scenario("acrobot_pbvs", ["perturbations.believed_robot=acrobot_small"])
-    write_run_inputs(tmp_path, scenario, load_robot("acrobot_small"))
-    again = load_scenario(str(tmp_path / "scenario.yaml"))
-    assert again.perturbations.believed_robot == str(tmp_path / BELIEVED_FILE)
-    robot = load_robot(again.robot)
-    np.testing.assert_array_equal(believed_robot(again, robot).cables.p_WA, robot.cable_set().p_WA)
 
 
 def test_a_target_without_tags_is_refused():
@@ -114,15 +121,19 @@ def test_poses_of_rest_are_held_by_tensions_within_the_limits():
 SHORT = ("trajectory.pause=0.2", "duration=3.0", "integration.engine=compiled")
 
 
+def short_scenario():
+    scenario = load_scenario("acrobot_computed_torque", SHORT)
+    scenario.trajectory.stretches = [replace(scenario.trajectory.stretches[0], duration=1.5)]
+    return scenario
+
+
 @pytest.fixture(scope="module")
 def identified(tmp_path_factory):
     """A campaign of eight poses, whose robot tracks one stretch; its folder and its numbers."""
-    scenario = load_scenario("acrobot_computed_torque", SHORT)
-    scenario.trajectory.stretches = [replace(scenario.trajectory.stretches[0], duration=1.5)]
     folder = tmp_path_factory.mktemp("campaigns") / "one"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(identify_campaign, "POSES", 8)
-        fit = identify_campaign.identify_campaign(scenario, folder=folder)
+        fit = identify_campaign.identify_campaign(short_scenario(), folder=folder)
     return folder, fit, json.loads((folder / "results.json").read_text())
 
 
@@ -134,13 +145,24 @@ def test_it_is_written_and_shows_itself(identified):
     assert json.loads(json.dumps(fit.as_dict())) == said
     assert {path.stem for path in folder.glob("*.png")} == {"validation", "parameters", "tracking"}
     assert "Tracking of acrobot_computed_torque" in repr(fit)
-    assert load_robot(str(folder / "robot.yaml")).platform.mass == fit.model.platform.mass
+    robot = load_robot(str(folder / "robot.yaml"))
+    assert robot.platform.mass == fit.model.platform.mass
+    stiffness = [u.value for u in fit.unknowns if u.name.endswith("stiffness")]
+    np.testing.assert_allclose(robot.stiffness(), stiffness, rtol=1e-9)
     with pytest.raises(CdprError, match="found 'trackin'; did you mean tracking"):
         fit.plot("trackin")
 
 
+def test_it_is_read_again(identified, monkeypatch):
+    folder, fit, said = identified
+    monkeypatch.delattr(identify_campaign, "simulate_campaign")
+    again = identify_campaign.identify_campaign(short_scenario(), folder=folder, follow=COMMAND)
+    assert json.loads(json.dumps(again.as_dict())) == said
+    assert repr(again) == repr(fit)
+
+
 def test_the_true_robot_tracks_as_well_with_what_was_found(identified):
-    tracking = identified[1].source.tracking
+    tracking = identified[2]["campaign"]["tracking"]
     before, after, true = (tracking[w]["mean_m"] for w in ("believed before", "identified", "true"))
     assert after < 0.02 * before
     assert after < 1.2 * true
@@ -165,7 +187,7 @@ def test_the_logs_that_it_leaves_say_the_same(identified):
     believed = load_robot(str(folder / "believed_robot.yaml"))
     log = read_measurements(folder / "excitation.csv", [cable.name for cable in believed.cables])
     task = IdentificationTask(
-        robot=believed, unknown=fit.source.identification.task.unknown, pulleys=False,
+        robot=believed, unknown=fit.source.task.unknown, pulleys=False,
         sigma_lengths=identify_campaign.SIGMA_LENGTHS,
     )  # fmt: skip
     again = fit_dynamics(task, log, bandwidth=identify_campaign.BANDWIDTH).result
@@ -183,9 +205,3 @@ def test_its_scenario_runs_with_the_robot_that_was_found(identified):
 
     # Ideal tensions: only the platform and its distribution are believed.
     assert largest_error() < 0.05 * largest_error(belief)
-
-
-def test_beliefs_beside_predictive_control_are_refused(identified):
-    wrong = f"perturbations.believed_robot={identified[0] / 'robot.yaml'}"
-    with pytest.raises(ScenarioError, match="believed_robot: found beside predictive"):
-        load_scenario("acrobot_computed_torque", (wrong, "predictive.steps=5"))

@@ -131,22 +131,6 @@ def test_rows_by_name_are_held_out():
     assert rows.tolist() == [1, 2, 3, 8]
 
 
-@pytest.mark.parametrize("words", ["0", "9", "50-60", "50-99999999999", "nine", "1-9"])
-def test_rows_that_cannot_be_held_out_are_refused(words):
-    with pytest.raises(CalibrationError, match="hold_out: found"):
-        calibrated(hold_out=words)
-
-
-def test_positions_without_rotations_are_read():
-    log = read()
-    assert log.poses is None
-    assert log.points.shape == (ROWS, 3)
-    assert np.isfinite(log.points[:9]).all()
-    assert np.isnan(log.points[9:]).all()
-    np.testing.assert_allclose(log.points[8], [0.0628474, -0.0557797, 1.38851])
-    assert log.angles[1, 0] == pytest.approx(np.radians(-4834.89))
-
-
 def test_motors_whose_sign_is_turned_are_no_fit_and_named():
     log, robot = read(), load_robot("hangprinter_4")
     turned = replace(log, angles=-log.angles)

@@ -20,6 +20,7 @@ def stopping():
     """Lengths, swivel angles that pass pi, and tensions of stops and ways between, at 10 Hz."""
     random = np.random.default_rng(0)
     corners = random.uniform(-0.2, 0.2, (STOPS + 1, 4))
+    corners[2, 0] = 0.0  # a swivel angle whose noise jumps from pi to -pi
     way = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 40))[:, None]
     rows = np.vstack([
         part for a, b in pairwise(corners) for part in (np.tile(a, (STANDS, 1)), a + way * (b - a))

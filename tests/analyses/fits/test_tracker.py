@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from cdpr_drake.analyses.fits.calibration import calibration_fit, fit_robot
-from cdpr_drake.analyses.fits.poses import rest_poses
 from cdpr_drake.analyses.fits.prediction import next_poses
-from cdpr_drake.analyses.fits.robots import calibration_model
+from cdpr_drake.analyses.fits.robots import calibration_model, rest_poses
 from cdpr_drake.analyses.fits.tags import TagPlace, read_tags
 from cdpr_drake.analyses.planning.path_files import read_path
 from cdpr_drake.calibration.guesses import with_tags
@@ -20,7 +19,7 @@ from cdpr_drake.calibration.measurements import (
 from cdpr_drake.calibration.parameters import model_difference, parameter_layout
 from cdpr_drake.calibration.pose_design import expected_std
 from cdpr_drake.errors import CalibrationError
-from cdpr_drake.geometry.poses import pose_error, pose_from_angles
+from cdpr_drake.geometry.poses import place_error, pose_error, pose_from_angles
 from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.vision.apriltags import TagTarget
 from tests.analyses.fits.logs import ROBOT, SIGMAS, poses, recorded, tracked_fit
@@ -170,6 +169,12 @@ def test_next_poses_tell_more_than_poses_at_random(first, proposed):
     others = [rest_poses(ROBOT, NEXT, np.random.default_rng(k))[0] for k in (11, 12, 13)]
     volumes = [np.prod(std_after(first, poses, 8)) for poses in (proposed.poses, *others)]
     assert volumes[0] < min(volumes[1:])
+
+
+def test_what_the_log_tells_counts_in_the_choice(first, proposed):
+    nothing = replace(first.result, information=np.zeros_like(first.result.information))
+    others = next_poses(first.setup, nothing, NEXT).poses
+    assert max(place_error(X, Y) for X, Y in zip(proposed.poses, others, strict=True)) > 0.01
 
 
 def test_the_file_of_next_poses_is_a_path(proposed, tmp_path):

@@ -15,7 +15,7 @@ import pytest
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.fits import swings
-from cdpr_drake.analyses.fits.figures import fit_figure
+from cdpr_drake.analyses.fits.figures import correlation_figure, fit_figure
 from cdpr_drake.analyses.fits.fit import Fit as Fitted
 from cdpr_drake.analyses.fits.fit import Unknown
 from cdpr_drake.analyses.fits.identification import parameter_figure
@@ -269,6 +269,15 @@ def test_the_figure_says_why_it_is_no_fit(spread):
     title = " ".join(figure.get_suptitle().split())
     for words in ("does not fit", "residuals are 4 sigmas, root mean square; accepted: at most 3"):
         assert (words in title) == (spread > 3.0)
+
+
+def test_names_beside_correlations_are_whole():
+    names = [f"C{k}.anchor_point.{axis}" for k in range(1, 9) for axis in "xyz"] * 3
+    fitted = Fitted(
+        title="", model=None, status="", unknowns=tuple(Unknown(name, "m", 1.0) for name in names),
+        spread=None, covariance=np.eye(len(names)),
+    )  # fmt: skip
+    assert figure_faults(correlation_figure(fitted)) == []
 
 
 def stretch(begin):

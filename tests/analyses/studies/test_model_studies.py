@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cdpr_drake.analyses.fits.poses import rest_poses
+from cdpr_drake.analyses.fits.robots import rest_poses
 from cdpr_drake.analyses.studies import calibration, identification
 from cdpr_drake.analyses.studies.facts import facts_of
 from cdpr_drake.analyses.studies.study import study_named, with_names_of_tables

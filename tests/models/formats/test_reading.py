@@ -114,6 +114,9 @@ QUARTER = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 LISTED = "<!DOCTYPE cables [\n  <!ATTLIST cable_set id ID #REQUIRED>\n]>"
 FLAT_Z = {"gravity_direction": [0.0, -np.sin(0.02), -np.cos(0.02)]}
 PULLEYS, LOAD = toy(pulley=True), '"platform": {"ext_force_loc": '
+LAST = "gear_ratio: 51:4\nanchor_x: 0\nanchor_y: 0"
+"""Of Klipper's fourth winch."""
+
 MATERIAL = {"diameter": 0.006, "drum_radius": 0.1, "motor_inertia": 0.0015, "cables.0.lower": 5.0,
             "cables.0.upper": 720.0, "cables.7.swivel_axis": [0, 1, 0], "name": "toy_1",
             "inertia": [14, 14, 14, 0, 0, 0]}  # fmt: skip
@@ -229,6 +232,11 @@ KEPT = {
                 ["Not kept: printer.max_accel, winch.oddity, extruder.",
                  "Included files were not read: mcu.cfg.",
                  "Keys of steppers that were not kept: step_pin."], []),
+    "klipper drums": (files.klipper, [("40\n" + LAST, "50\n" + LAST)],
+                      {"cables.3.drum_radius": 0.05 / (2 * np.pi), "cables.0.drum_radius": None,
+                       "drum_radius": 0.04 / (2 * np.pi)}, [], []),
+    "klipper gears": (files.klipper, [(LAST, LAST.replace("51:4", "9:1"))],
+                      {"drum_radius": None}, ["Gears differ from winch to winch"], []),
     "reprapfirmware": (files.reprap, [],
                        {"cables.3.exit_point": [0, 0, 2.345], "gear_ratio": 12.75, "mass": 2.5,
                         "cables.3.mechanical_advantage": 2.0, "drum_radius": 0.065 - 0.5e-3,
