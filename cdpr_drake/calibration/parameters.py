@@ -60,13 +60,20 @@ GROUPS = {
         "tilt_zero", "tilt's zero", ("roll", "pitch", "yaw"), ("rad",) * 3, (0.05,) * 3, "robot"
     ),
     "clock": ParameterGroup("clock", "tracker's clock", (), ("s",), (0.01,), "robot"),
+    "common_length_offset": ParameterGroup(
+        "common_length_offset", "offset of all lengths", (), ("m",), (0.01,), "robot"
+    ),
+    "common_length_scale": ParameterGroup(
+        "common_length_scale", "stretch of all lengths", (), ("-",), (0.01,), "robot"
+    ),
 }
 """Kinds of parameters in the order of the vector.
 
 `length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
 is cable that is paid out. `drum_radii` are by how much each drum is larger, beside
 `common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise
-than a scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
+than a scale. `common_length_scale` multiplies all readings, from zero on, and
+`common_length_offset` is added to all lengths: one tape or one encoder's scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
 tracker's marker are about the axes of P, of tags and of the tracker's frame about those of W."""
 
 POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
@@ -91,6 +98,8 @@ class CalibrationModel:
         common_drum_radius: By how much all of them are larger, besides [m].
         tilt_zero: Roll, pitch and yaw at which a tilt sensor reads zero, shape (3,) [rad].
         clock: By how much a tracker is late [s].
+        common_length_offset: Further part of all length offsets [m].
+        common_length_scale: Factor of all readings of lengths, from zero on [-].
     """
 
     names: tuple[str, ...]
@@ -106,6 +115,8 @@ class CalibrationModel:
     common_drum_radius: float = 0.0
     tilt_zero: Array = field(default_factory=lambda: np.zeros(3))
     clock: float = 0.0
+    common_length_offset: float = 0.0
+    common_length_scale: float = 1.0
 
     def __post_init__(self) -> None:
         """Fills in what was left out.
@@ -260,6 +271,10 @@ def moved_model(
         common_drum_radius=model.common_drum_radius + float(step[at["common_drum_radius"]][0]),
         tilt_zero=model.tilt_zero + step[at["tilt_zeros"]],
         clock=model.clock + float(step[at["clock"]][0]),
+        common_length_offset=(
+            model.common_length_offset + float(step[at["common_length_offset"]][0])
+        ),
+        common_length_scale=model.common_length_scale + float(step[at["common_length_scale"]][0]),
     )
 
 
@@ -301,6 +316,8 @@ def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
         np.array([model.common_drum_radius - other.common_drum_radius]),
         model.tilt_zero - other.tilt_zero,
         np.array([model.clock - other.clock]),
+        np.array([model.common_length_offset - other.common_length_offset]),
+        np.array([model.common_length_scale - other.common_length_scale]),
     ]
     return np.concatenate(parts)
 

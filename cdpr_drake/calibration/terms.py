@@ -141,11 +141,17 @@ def _own(at: Point, group: str) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.in
     return i, at.layout.slices[group].start + i
 
 
+def _common(at: Point, group: str) -> tuple[npt.NDArray[np.intp], int]:
+    """Rows, one a cable, and the column of a number that all cables have in common."""
+    return np.arange(at.model.cables.count), at.layout.slices[group].start
+
+
 @dataclass(eq=False)
 class Lengths(CableTerm):
     """Cable lengths that winches counted, from a reading each where counting began.
 
-    A reading is model = start + (length / (1 + strain) - start - offset) / scale.
+    A reading is model = (start + (length / (1 + strain) - start - offset) / scale) / common scale;
+    the offset is the cable's own and the common one.
 
     Attributes:
         readings: Shape (k, m) [m].
@@ -165,26 +171,33 @@ class Lengths(CableTerm):
 
     def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
         """As the base class says."""
-        scale, per_length = at.model.length_scale, 1.0 / (1.0 + self.strain)
-        counted = at.numbers[:, :, LENGTH] * per_length - self.start - at.model.length_offset
-        u, slope = at.vector(U), per_length / scale
+        model, per_length = at.model, 1.0 / (1.0 + self.strain)
+        scale, common = model.length_scale, model.common_length_scale
+        offset = model.length_offset + model.common_length_offset
+        counted = at.numbers[:, :, LENGTH] * per_length - self.start - offset
+        whole = self.start + counted / scale
+        u, slope = at.vector(U), per_length / scale / common
         u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
         slopes: Slopes = [
             (*_three(at, "exit_points"), -u * slope[:, :, None]),
             (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
-            (*_own(at, "length_offsets"), -1.0 / scale),
-            (*_own(at, "length_scales"), -counted / scale**2),
+            (*_own(at, "length_offsets"), -1.0 / scale / common),
+            (*_own(at, "length_scales"), -counted / scale**2 / common),
+            (*_common(at, "common_length_offset"), -1.0 / scale / common),
+            (*_common(at, "common_length_scale"), -whole / common**2),
             (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
         ]
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
-        return self.start + counted / scale - self.readings, B, slopes
+        return whole / common - self.readings, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Lengths:
         """As the base class says."""
         offsets = np.array([model.length_offset for model in models])
-        return replace(self, readings=self.readings + offsets / base.length_scale)
+        return replace(
+            self, readings=self.readings + offsets / base.length_scale / base.common_length_scale
+        )
 
 
 @dataclass(eq=False)
@@ -192,8 +205,8 @@ class ZeroedCables(Term):
     """What was paid out since winches stood at zero: cable lengths, or what motor angles say.
 
     Winches stood at zero at a pose that is known, where cables were as long as the model says
-    there, and by `length_offset` longer; without such a pose `length_offset` is the whole length
-    at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out. What a
+    there, and by `length_offset` and the common one longer; without such a pose these are the whole
+    length at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out. What a
     motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square of the
     radius at which line leaves falls in proportion to what is paid out, as in firmware of
     Hangprinters.
@@ -239,8 +252,10 @@ class ZeroedCables(Term):
         """As the base class says."""
         model, slope = at.model, 1.0 / (1.0 + self.strain)
         paid, by_radius = self.paid_out(model)
-        scale, u = model.length_scale, at.vector(U)
-        residual = at.numbers[:, :, LENGTH] * slope - model.length_offset - scale * paid
+        common, u = model.common_length_scale, at.vector(U)
+        scale, offset = model.length_scale * common, model.length_offset
+        offset = offset + model.common_length_offset
+        residual = at.numbers[:, :, LENGTH] * slope - offset - scale * paid
         residual = residual - self.added
         exits = -u * slope[:, :, None]
         anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
@@ -256,11 +271,12 @@ class ZeroedCables(Term):
             (*_three(at, "anchor_points"), anchors),
             (*_own(at, "pulley_radii"), radii),
             (*_own(at, "length_offsets"), -1.0),
-            (*_own(at, "length_scales"), -paid),
+            (*_own(at, "length_scales"), -paid * common),
             (*_own(at, "drum_radii"), -scale * by_radius),
-            (np.arange(len(scale)), at.layout.slices["common_drum_radius"].start,
-             -scale * by_radius),
-        ]  # fmt: skip
+            (*_common(at, "common_drum_radius"), -scale * by_radius),
+            (*_common(at, "common_length_offset"), -1.0),
+            (*_common(at, "common_length_scale"), -paid * model.length_scale),
+        ]
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
@@ -268,7 +284,8 @@ class ZeroedCables(Term):
 
     def values(self, at: Point) -> Array:
         """As the base class says: cable that was paid out [m]."""
-        return at.model.length_scale * self.paid_out(at.model)[0]
+        scale = at.model.length_scale * at.model.common_length_scale
+        return scale * self.paid_out(at.model)[0]
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """As the base class says."""
