@@ -50,6 +50,9 @@ MOST_REFINEMENTS = 8
 GAIN = 1e-2
 """A cost that falls by more is better."""
 
+TRIAL_GAIN = 0.1
+"""Share by which a cost falls at least, for a trial of a single start to go on with refinements."""
+
 NEAR_PLACE, NEAR_TURN = 0.02, 0.1
 """Places this near in parts of the frame's size, and turns [rad], are on their way to one
 minimum."""
@@ -138,7 +141,7 @@ def best_of_starts(setup: Setup, say: Callable[[str], None], others: bool = True
                 if at is None:
                     continue
             minimum = _solved(setup, program, at, straight=False)
-            minima.append(_improved(setup, minimum, []))
+            minima.append(_improved(setup, minimum, [], 0.0 if others else TRIAL_GAIN))
         except CalibrationError as refusal:
             failure = refusal
             if number == 0:
@@ -270,8 +273,11 @@ def _close(setup: Setup, R: Array, p: Array, S: Array, q: Array) -> npt.NDArray[
     return np.asarray((apart < NEAR_PLACE * size) & (turned < NEAR_TURN))
 
 
-def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minimum:
-    """The same from poses that are sought anew, as some first end in wrong minima; while better."""
+def _improved(
+    setup: Setup, minimum: Minimum, pool: Sequence[Stations], least: float = 0.0
+) -> Minimum:
+    """The same from poses that are sought anew, as some first end in wrong minima; while better, by
+    a share at least."""
     for _ in range(MOST_REFINEMENTS):
         rows, ends, here = _elsewhere(setup, minimum, pool, every=False)
         better = ends.costs < here[rows] - GAIN
@@ -289,9 +295,12 @@ def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minim
             again = _solved(setup, minimum.program, start, straight=True)
         except CalibrationError:  # poses that are better alone leave something untold
             break
-        if again.cost >= minimum.cost - GAIN:
+        gain = minimum.cost - again.cost
+        if gain <= GAIN:
             break
         minimum = again
+        if gain < least * minimum.cost:
+            break
     return minimum
 
 

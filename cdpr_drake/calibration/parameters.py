@@ -73,8 +73,9 @@ GROUPS = {
 is cable that is paid out. `drum_radii` are by how much each drum is larger, beside
 `common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise
 than a scale. `common_length_scale` multiplies all readings, from zero on, and
-`common_length_offset` is added to all lengths: one tape or one encoder's scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
-tracker's marker are about the axes of P, of tags and of the tracker's frame about those of W."""
+`common_length_offset` is added to all lengths: one tape or one encoder's scale. `clock` is by how
+much a tracker is late. Turns (rx, ry, rz) of the camera and of a tracker's marker are about the
+axes of P, of tags and of the tracker's frame about those of W."""
 
 POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
 """Groups whose members are poses: turns, which do not add up, then translations."""

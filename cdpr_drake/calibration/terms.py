@@ -8,7 +8,7 @@ sensors are in `sensor_terms`. A number that is NaN was not measured. Poses turn
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -36,6 +36,8 @@ Evaluated = tuple[Array, Array, Array]
 Slopes = list[tuple[Any, Any, Any]]
 """Rows and columns of derivatives by parameters, and the values there at each pose."""
 
+Parts = tuple[Array, Array, Callable[[], Slopes]]
+
 EVERY_ROW = slice(None)
 
 
@@ -57,16 +59,16 @@ class Term(ABC):
     sigma: Any
 
     @abstractmethod
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """Residuals in the unit, shape (k, rows), and their derivatives by what is unknown of each
-        pose, shape (k, rows, width), and by parameters."""
+        pose, shape (k, rows, width), and, as a function, by parameters."""
 
     def evaluate(self, at: Point) -> Evaluated:
         """Residuals over their sigmas, shape (k, rows), zero where nothing was measured, and their
         derivatives by all parameters, (k, rows, n), and by each pose, (k, rows, width)."""
         residual, B, slopes = self.parts(at)
         A = np.zeros((*residual.shape, at.layout.size))
-        for rows, columns, values in slopes:
+        for rows, columns, values in slopes():
             A[:, rows, columns] = values
         weight = self.weights()
         return self._weighted(residual, weight), A * weight[:, :, None], B * weight[:, :, None]
@@ -169,7 +171,7 @@ class Lengths(CableTerm):
     word = "length"
     by_pose = ("readings", "sigma", "strain")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says."""
         model, per_length = at.model, 1.0 / (1.0 + self.strain)
         scale, common = model.length_scale, model.common_length_scale
@@ -177,16 +179,19 @@ class Lengths(CableTerm):
         counted = at.numbers[:, :, LENGTH] * per_length - self.start - offset
         whole = self.start + counted / scale
         u, slope = at.vector(U), per_length / scale / common
-        u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), -u * slope[:, :, None]),
-            (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
-            (*_own(at, "length_offsets"), -1.0 / scale / common),
-            (*_own(at, "length_scales"), -counted / scale**2 / common),
-            (*_common(at, "common_length_offset"), -1.0 / scale / common),
-            (*_common(at, "common_length_scale"), -whole / common**2),
-            (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
-        ]
+
+        def slopes() -> Slopes:
+            u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
+            return [
+                (*_three(at, "exit_points"), -u * slope[:, :, None]),
+                (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
+                (*_own(at, "length_offsets"), -1.0 / scale / common),
+                (*_own(at, "length_scales"), -counted / scale**2 / common),
+                (*_common(at, "common_length_offset"), -1.0 / scale / common),
+                (*_common(at, "common_length_scale"), -whole / common**2),
+                (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
+            ]
+
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
@@ -206,9 +211,9 @@ class ZeroedCables(Term):
 
     Winches stood at zero at a pose that is known, where cables were as long as the model says
     there, and by `length_offset` and the common one longer; without such a pose these are the whole
-    length at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out. What a
-    motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square of the
-    radius at which line leaves falls in proportion to what is paid out, as in firmware of
+    length at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out.
+    What a motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square
+    of the radius at which line leaves falls in proportion to what is paid out, as in firmware of
     Hangprinters.
 
     Attributes:
@@ -248,7 +253,7 @@ class ZeroedCables(Term):
         drum = replace(self.drum, radius=self.drum.radius + grown)
         return drum.paid_out(self.readings), drum.per_radius(self.readings) / self.advantage
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says."""
         model, slope = at.model, 1.0 / (1.0 + self.strain)
         paid, by_radius = self.paid_out(model)
@@ -257,26 +262,31 @@ class ZeroedCables(Term):
         offset = offset + model.common_length_offset
         residual = at.numbers[:, :, LENGTH] * slope - offset - scale * paid
         residual = residual - self.added
-        exits = -u * slope[:, :, None]
-        anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
-        radii = at.numbers[:, :, RADIUS_SLOPE] * slope
+        home = None
         if self.zero is not None:
             home = Point(model, Stations.at([self.zero]), at.layout)
-            v = home.vector(U)[0]
             residual = residual - home.numbers[0, :, LENGTH]
-            exits, anchors = exits + v, anchors - v @ home.stations.R[0]
-            radii = radii - home.numbers[0, :, RADIUS_SLOPE]
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), exits),
-            (*_three(at, "anchor_points"), anchors),
-            (*_own(at, "pulley_radii"), radii),
-            (*_own(at, "length_offsets"), -1.0),
-            (*_own(at, "length_scales"), -paid * common),
-            (*_own(at, "drum_radii"), -scale * by_radius),
-            (*_common(at, "common_drum_radius"), -scale * by_radius),
-            (*_common(at, "common_length_offset"), -1.0),
-            (*_common(at, "common_length_scale"), -paid * model.length_scale),
-        ]
+
+        def slopes() -> Slopes:
+            exits = -u * slope[:, :, None]
+            anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
+            radii = at.numbers[:, :, RADIUS_SLOPE] * slope
+            if home is not None:
+                v = home.vector(U)[0]
+                exits, anchors = exits + v, anchors - v @ home.stations.R[0]
+                radii = radii - home.numbers[0, :, RADIUS_SLOPE]
+            return [
+                (*_three(at, "exit_points"), exits),
+                (*_three(at, "anchor_points"), anchors),
+                (*_own(at, "pulley_radii"), radii),
+                (*_own(at, "length_offsets"), -1.0),
+                (*_own(at, "length_scales"), -paid * common),
+                (*_own(at, "drum_radii"), -scale * by_radius),
+                (*_common(at, "common_drum_radius"), -scale * by_radius),
+                (*_common(at, "common_length_offset"), -1.0),
+                (*_common(at, "common_length_scale"), -paid * model.length_scale),
+            ]
+
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
@@ -314,16 +324,19 @@ class Swivels(CableTerm):
     unit = "rad"
     word = "swivel angle"
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says."""
         residual = at.numbers[:, :, SWIVEL_ANGLE] - at.model.swivel_offset - self.readings
         residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
         g = at.vector(ACROSS)
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), -g),
-            (*_three(at, "anchor_points"), np.einsum("kba,kmb->kma", at.stations.R, g)),
-            (*_own(at, "swivel_offsets"), -1.0),
-        ]
+
+        def slopes() -> Slopes:
+            return [
+                (*_three(at, "exit_points"), -g),
+                (*_three(at, "anchor_points"), np.einsum("kba,kmb->kma", at.stations.R, g)),
+                (*_own(at, "swivel_offsets"), -1.0),
+            ]
+
         B = at.blank(g.shape[1])
         B[:, :, :3], B[:, :, 3:POSE] = np.cross(at.vector(ARM), g), g
         return residual, B, slopes
@@ -350,13 +363,13 @@ class Tensions(CableTerm):
     word = "tension"
     by_pose = ("readings", "sigma")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says."""
         assert at.stations.tensions is not None
         m = self.readings.shape[1]
         B = at.blank(m)
         B[:, np.arange(m), POSE + np.arange(m)] = 1.0
-        return at.stations.tensions - self.readings, B, []
+        return at.stations.tensions - self.readings, B, list
 
 
 @dataclass(eq=False)
@@ -384,7 +397,7 @@ class EquilibriumTerm(Term):
     kind = "equilibrium"
     unit = "N m, N"
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says, of a body in space, in each of six rows."""
         t = at.stations.tensions
         assert t is not None
@@ -402,15 +415,19 @@ class EquilibriumTerm(Term):
         by_arm = by_point.copy()
         by_arm[:, :, :3] -= ux
         minus_t = -t[:, :, None, None]
-        exits = -minus_t * by_point
-        anchors = minus_t * (by_arm @ at.stations.R[:, None])
-        bend = at.vector(BEND)
-        bent = np.concatenate([np.cross(arm, bend), bend], axis=2) * -t[:, :, None]
-        slopes: Slopes = [
-            (EVERY_ROW, where["exit_points"], np.moveaxis(exits, 1, 2).reshape(-1, 6, 3 * m)),
-            (EVERY_ROW, where["anchor_points"], np.moveaxis(anchors, 1, 2).reshape(-1, 6, 3 * m)),
-            (EVERY_ROW, where["pulley_radii"], np.moveaxis(bent, 1, 2)),
-        ]
+
+        def slopes() -> Slopes:
+            exits = -minus_t * by_point
+            anchors = minus_t * (by_arm @ at.stations.R[:, None])
+            exits, anchors = (np.moveaxis(x, 1, 2).reshape(-1, 6, 3 * m) for x in (exits, anchors))
+            bend = at.vector(BEND)
+            bent = np.concatenate([np.cross(arm, bend), bend], axis=2) * -t[:, :, None]
+            return [
+                (EVERY_ROW, where["exit_points"], exits),
+                (EVERY_ROW, where["anchor_points"], anchors),
+                (EVERY_ROW, where["pulley_radii"], np.moveaxis(bent, 1, 2)),
+            ]
+
         B = at.blank(6)
         B[:, :, :3] = np.sum(minus_t * (by_arm @ -armx), axis=1)
         B[:, :3, :3] += crosses(f) @ crosses(lever)
