@@ -1,6 +1,7 @@
 """`calibrate`, `identify` and `calibrate-camera`: what they write and say, and what they refuse."""
 
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -154,12 +155,13 @@ def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(here, capsys):
 
 def test_what_a_robot_file_cannot_hold_is_said():
     class Result:
-        model = TRUE
-        names = ("C1.length_offset", "C1.length_scale")
+        model = replace(TRUE, common_length_scale=1.01)
+        names = ("C1.length_offset", "C1.length_scale", "common_length_scale")
         status = "converged"
 
-    _, left = calibrated_robot(ROBOT, Result())
-    assert len(left) == 2
+    robot, left = calibrated_robot(ROBOT, Result())
+    assert len(left) == 3
+    assert robot.winch.drum_radius == pytest.approx(1.01 * ROBOT.winch.drum_radius)
 
 
 def test_a_hangprinter_is_calibrated_from_its_recorded_series(here, capsys):
