@@ -373,7 +373,7 @@ class Tensions(CableTerm):
 
 
 @dataclass(eq=False)
-class EquilibriumTerm(Term):
+class Rest(Term):
     """The platform rests: tensions and weight balance up to what is not modelled.
 
     Of a platform that moves less than a body in space they balance along the motions that it has:
@@ -493,6 +493,6 @@ class EquilibriumTerm(Term):
         """As the base class says."""
         return "N m" if row < self._turns() else "N"
 
-    def only(self, which: npt.NDArray[np.generic] | slice) -> EquilibriumTerm:
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Rest:
         """As the base class says."""
         return replace(self, count=len(np.arange(self.count)[which]))
