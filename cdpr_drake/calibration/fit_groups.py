@@ -201,7 +201,7 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
     if len(rows) < FEWEST_EXPLAINED:
         return
     for kind, columns in zip(residuals.kinds, residuals.columns, strict=True):
-        off, seen, c, _ = _own_factors(residuals, rows, columns, residuals.measured)
+        off, seen, c = _own_factors(residuals, rows, columns, residuals.measured)
         before, after = (np.max(np.abs(x), axis=1) for x in (off, off - c[:, None] * seen))
         clear = after < np.maximum(LEFT_OVER * before, np.minimum(OUTLIER, HALF * before))
         middle = float(np.median(c[clear])) if clear.any() else 0.0
@@ -218,19 +218,9 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
 
 def _own_factors(
     residuals: _Residuals, rows: Rows, columns: Rows, counted: Flags
-) -> tuple[Array, Array, Array, Array]:
-    """Factors of some columns that rows need by themselves, the model as it is.
-
-    Args:
-        residuals: All of them.
-        rows: Rows k that are looked at.
-        columns: What the factor multiplies.
-        counted: Readings that count, of all rows.
-
-    Returns:
-        Residuals and errors for a change of 1 behind the poses alone, each shape (k, R); the change
-        of the factor, shape (k,), zero where it is not seen; and the error before, (k, R).
-    """
+) -> tuple[Array, Array, Array]:
+    """Factors of columns that each of some rows needs by itself, the model as it is: residuals and
+    errors for a change of 1 behind the poses alone, both (k, R), and the change, (k,), or zero."""
     counts = counted[rows]
     B = residuals.slopes[rows] * counts[:, :, None]
     d = np.zeros(counts.shape)
@@ -243,7 +233,7 @@ def _own_factors(
     size = np.sum(seen**2, axis=1)
     told = size > LEAST_SEEN * np.sum(d**2, axis=1)
     c = np.where(told, np.sum(d * off, axis=1) / np.where(told, size, 1.0), 0.0)
-    return off, seen * told[:, None], c, d
+    return off, seen * told[:, None], c
 
 
 def _row_words(rows: Sequence[int] | Rows) -> str:
@@ -456,7 +446,7 @@ def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
     Two groups of numbers with weights w differ by W_1 W_2 / (W_1 + W_2) (c_1 - c_2)^2, which grows
     by about 2 log C(N, n) if n of N are chosen for it.
     """
-    _, seen, c, _ = _own_factors(residuals, np.arange(len(residuals.r)), columns, residuals.used)
+    _, seen, c = _own_factors(residuals, np.arange(len(residuals.r)), columns, residuals.used)
     w = np.sum(seen**2, axis=1)
     order = np.flatnonzero(w > 0.0)
     order = order[np.argsort(c[order])]
@@ -521,14 +511,8 @@ def _test(
 def _variance(
     residuals: _Residuals, sums: Array, degrees: Array, weights: Array
 ) -> tuple[float, float]:
-    """Of d' r, and its degrees of freedom by Satterthwaite.
-
-    Args:
-        residuals: All of them.
-        sums: Squares of the residuals of each kind once the error is out, shape (g,).
-        degrees: Their degrees of freedom, shape (g,).
-        weights: Squares of M d in each kind, shape (g,).
-    """
+    """Variance of d' r, and its degrees of freedom by Satterthwaite; of each kind squares of the
+    residuals once the error is out, their degrees of freedom, and squares of M d, each (g,)."""
     told = residuals.told & (residuals.sums > 0.0)
     before = np.where(told, residuals.sums / np.where(told, residuals.degrees_of, 1.0), 1.0)
     after = np.where(told, sums / np.maximum(degrees, 1e-9), 1.0)

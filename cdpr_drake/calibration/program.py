@@ -97,9 +97,7 @@ class CalibrationProgram(WholeProgram):
         self.free = self.layout.select(unknown)
         self.stations = Stations.at(poses)
         self.terms: list[Term] = []
-        self._freedom = PoseFreedom(motion)
-        self._std = np.full(self.layout.size, np.inf)
-        super().__init__()
+        super().__init__(PoseFreedom(motion))
 
     def AddLengths(
         self,

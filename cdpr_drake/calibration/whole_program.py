@@ -13,7 +13,8 @@ from pydrake.symbolic import Variable
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import LeastSquares
-from cdpr_drake.calibration.parameters import ParameterLayout, model_difference
+from cdpr_drake.calibration.parameters import CalibrationModel, ParameterLayout, model_difference
+from cdpr_drake.calibration.pose_freedom import PoseFreedom
 from cdpr_drake.calibration.stations import Point, Stations, turn_slope, turn_vectors
 from cdpr_drake.calibration.terms import Term
 from cdpr_drake.errors import CalibrationError
@@ -28,19 +29,23 @@ class WholeProgram(OwnTerms):
     """A calibration as one MathematicalProgram of parameters and poses, with terms of one's own.
 
     Attributes:
-        layout: All parameters.
+        model: The robot as it is believed.
+        layout: Its parameters.
         free: Which of them are unknown, shape (n,).
         stations: The poses from which the search starts.
         terms: What was measured.
     """
 
     problem_kind = CalibrationError
+    model: CalibrationModel
     layout: ParameterLayout
     free: npt.NDArray[np.bool_]
     stations: Stations
     terms: list[Term]
 
-    def __init__(self) -> None:
+    def __init__(self, freedom: PoseFreedom) -> None:
+        self._freedom = freedom
+        self._std = np.full(self.layout.size, np.inf)
         self._prog: MathematicalProgram | None = None
         self._theta = np.empty(0, object)
         self._own_poses: list[npt.NDArray[np.object_]] = []
