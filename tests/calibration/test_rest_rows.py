@@ -62,7 +62,8 @@ def test_stops_no_longer_than_a_window_are_found(noise):
     time, lengths, tensions, stands = recorded(noise, rows_of_a_stop=10)
     found = rows_at_rest(time, [lengths], tensions)
     assert len(found.groups) == STOPS
-    assert all(stands[group].all() for group in found.groups)
+    # The first and the last row of a way are where the platform stands.
+    assert all(np.sum(~stands[group]) <= 2 for group in found.groups)
 
 
 def test_means_are_those_of_the_rows():
