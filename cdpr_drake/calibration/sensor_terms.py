@@ -39,9 +39,9 @@ class TrackedPoses(Term):
     kind = "tracked poses"
     unit = "rad, m"
     by_pose = ("R", "p")
+    row_names = tuple(f"tracker, {what} {axis}" for what in ("turn", "place") for axis in "xyz")
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         seen = self.measured()
         X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
         R_WK = X_WK.rotation().matrix()
@@ -70,12 +70,10 @@ class TrackedPoses(Term):
         return residual, B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.all(np.isfinite(self.p), axis=1) & np.all(np.isfinite(self.R), axis=(1, 2))
         return np.repeat(np.asarray(whole)[:, None], 6, axis=1)
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         return np.tile([self.sigma_turn] * 3 + [self.sigma_place] * 3, (len(self.p), 1))
 
     def values(self, at: Point) -> Array:
@@ -84,10 +82,6 @@ class TrackedPoses(Term):
         turns = turn_vectors(np.where(seen[:, :1, None], self.R, np.eye(3)))
         R_WK = at.model.X_WK.rotation().matrix()
         return np.hstack([turns @ R_WK.T, self.p @ R_WK.T])
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tracker, {('turn', 'place')[row // 3]} {'xyz'[row % 3]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +132,7 @@ class TrackedPoints(Term):
     kind = "tracked positions"
     unit = "m"
     by_pose = ("points",)
+    row_names = ("tracker, place x", "tracker, place y", "tracker, place z")
 
     @cached_property
     def _whitening(self) -> Array:
@@ -146,7 +141,6 @@ class TrackedPoints(Term):
         return np.asarray(np.eye(3) + (self.sigma / self.sigma_along - 1.0) * np.outer(n, n))
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         k, where, seen = len(self.points), at.layout.slices, self.measured()
         X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
         R_WK = X_WK.rotation().matrix()
@@ -174,7 +168,6 @@ class TrackedPoints(Term):
         return residual @ W.T, W @ B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.asarray(np.isfinite(self.points).all(axis=1))
         return np.repeat(whole[:, None], 3, axis=1)
 
@@ -183,12 +176,7 @@ class TrackedPoints(Term):
         R_WK = at.model.X_WK.rotation().matrix()
         return np.asarray(self.points @ R_WK.T @ self._whitening.T)
 
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tracker, place {'xyz'[row]}"
-
     def only(self, which: npt.NDArray[np.generic] | slice) -> TrackedPoints:
-        """As the base class says."""
         course = None if self.course is None else self.course.only(which)
         return replace(super().only(which), course=course)
 
@@ -260,7 +248,6 @@ class TagCorners(Term):
         return residual.reshape(k, 8 * count), B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.asarray(np.all(np.isfinite(self.uv), axis=3))
         return np.repeat(whole.reshape(len(self.uv), -1), 2, axis=1)
 
@@ -269,7 +256,6 @@ class TagCorners(Term):
         return np.zeros(self.measured().shape)
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         corner, axis = divmod(row % 8, 2)
         return f"tag {self.tags[row // 8]}, corner {corner + 1}, {'uv'[axis]}"
 
@@ -295,6 +281,7 @@ class Tilts(Term):
     sigma_yaw: float
     kind = "inclination"
     unit = "rad"
+    row_names = ("roll", "pitch", "yaw")
 
     def parts(self, at: Point) -> Parts:
         """As the base class says; infinite where the platform is pitched by a right angle."""
@@ -320,9 +307,4 @@ class Tilts(Term):
         )  # fmt: skip
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         return np.tile([self.sigma_tilt, self.sigma_tilt, self.sigma_yaw], (len(self.readings), 1))
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return ("roll", "pitch", "yaw")[row]

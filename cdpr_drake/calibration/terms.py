@@ -48,6 +48,7 @@ class Term(ABC):
         kind: What they are.
         unit: Of a residual times its sigma; of two units the first is of the first three rows.
         by_pose: Fields that have a row for each pose.
+        row_names: What rows are, in words, unless `row_name` says it.
         readings: What was measured; terms without it say themselves what counts.
         sigma: Standard deviation, or one for each reading, in the unit.
     """
@@ -55,6 +56,7 @@ class Term(ABC):
     kind: str
     unit: str
     by_pose: ClassVar[tuple[str, ...]] = ("readings",)
+    row_names: ClassVar[tuple[str, ...]]
     readings: Array
     sigma: Any
 
@@ -94,9 +96,9 @@ class Term(ABC):
         """Standard deviations, shape (k, rows), in the unit."""
         return np.broadcast_to(self.sigma, self.measured().shape)
 
-    @abstractmethod
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """What a row is, in words; with the names of the cables."""
+        return self.row_names[row]
 
     def row_unit(self, row: int) -> str:
         """Unit of a row."""
@@ -127,7 +129,6 @@ class CableTerm(Term):
     word: str
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         return f"{self.word} of {names[row]}"
 
 
@@ -172,7 +173,6 @@ class Lengths(CableTerm):
     by_pose = ("readings", "sigma", "strain")
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         model, per_length = at.model, 1.0 / (1.0 + self.strain)
         scale, common = model.length_scale, model.common_length_scale
         offset = model.length_offset + model.common_length_offset
@@ -198,7 +198,6 @@ class Lengths(CableTerm):
         return whole / common - self.readings, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Lengths:
-        """As the base class says."""
         offsets = np.array([model.length_offset for model in models])
         return replace(
             self, readings=self.readings + offsets / base.length_scale / base.common_length_scale
@@ -254,7 +253,6 @@ class ZeroedCables(Term):
         return drum.paid_out(self.readings), drum.per_radius(self.readings) / self.advantage
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         model, slope = at.model, 1.0 / (1.0 + self.strain)
         paid, by_radius = self.paid_out(model)
         common, u = model.common_length_scale, at.vector(U)
@@ -298,13 +296,11 @@ class ZeroedCables(Term):
         return scale * self.paid_out(at.model)[0]
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         return f"{'length' if self.drum is None else 'motor angle'} of {names[row]}"
 
     def counted_by(
         self, models: Sequence[CalibrationModel], base: CalibrationModel
     ) -> ZeroedCables:
-        """As the base class says."""
         offsets = np.array([model.length_offset for model in models])
         return replace(self, added=self.added + offsets)
 
@@ -325,7 +321,6 @@ class Swivels(CableTerm):
     word = "swivel angle"
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         residual = at.numbers[:, :, SWIVEL_ANGLE] - at.model.swivel_offset - self.readings
         residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
         g = at.vector(ACROSS)
@@ -342,7 +337,6 @@ class Swivels(CableTerm):
         return residual, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Swivels:
-        """As the base class says."""
         offsets = np.array([model.swivel_offset for model in models])
         return replace(self, readings=self.readings + offsets)
 
@@ -364,7 +358,6 @@ class Tensions(CableTerm):
     by_pose = ("readings", "sigma")
 
     def parts(self, at: Point) -> Parts:
-        """As the base class says."""
         assert at.stations.tensions is not None
         m = self.readings.shape[1]
         B = at.blank(m)
@@ -451,7 +444,6 @@ class Rest(Term):
         return (bases @ r[:, :, None])[:, :, 0], bases @ A, bases @ B
 
     def by_poses(self, at: Point) -> tuple[Array, Array]:
-        """As the base class says."""
         r, B = super().by_poses(at)
         if self.motion is None:
             return r, B
@@ -465,7 +457,6 @@ class Rest(Term):
         return bases.reshape(-1, self.motion.freedom, 6)
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         rows = 6 if self.motion is None else self.motion.freedom
         return np.ones((self.count, rows), dtype=bool)
 
@@ -474,25 +465,20 @@ class Rest(Term):
         return 3 if self.motion is None else self.motion.num_turns
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         sigmas = np.full(self.measured().shape, self.sigma_force)
         sigmas[:, : self._turns()] = self.sigma_moment
         return sigmas
 
     def values(self, at: Point) -> Array:
-        """As the base class says."""
         return np.zeros(self.measured().shape)
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         if self.motion is not None:
             return self.motion.words()[row]
         return f"{('moment', 'force')[row // 3]} along {'xyz'[row % 3]}"
 
     def row_unit(self, row: int) -> str:
-        """As the base class says."""
         return "N m" if row < self._turns() else "N"
 
     def only(self, which: npt.NDArray[np.generic] | slice) -> Rest:
-        """As the base class says."""
         return replace(self, count=len(np.arange(self.count)[which]))
