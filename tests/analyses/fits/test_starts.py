@@ -262,7 +262,8 @@ UP = np.array([0.0, 0.0, 1.0])
 def turned(*angles, **more):
     """A result with poses of these roll, pitch and yaw."""
     poses = [pose_from_angles(np.zeros(3), np.array(turn)) for turn in angles]
-    return SimpleNamespace(stations=Stations.at(poses), **more)
+    model = calibration_model(three_cables())
+    return SimpleNamespace(model=model, stations=Stations.at(poses), **more)
 
 
 def test_poses_upside_down_are_distinguished_from_upright_ones():
