@@ -132,9 +132,9 @@ def test_points_unfold_from_lengths_in_space():
 
 
 def test_lengths_alone_tell_anchors_whatever_the_size_of_the_frame(tmp_path):
-    x, y = (0.3 + 0.15 * np.arange(6.0), 0.5 + 0.2 * np.arange(6.0))
+    x, y = np.linspace(0.05, 1.395, 9), np.linspace(0.3, 1.77, 9)  # near anchors minima are many
     places = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 1, 2)
-    noise = 1e-3 * np.random.default_rng(0).standard_normal((36, 4))
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((81, 4))
     lengths = 1e3 * (np.linalg.norm(places - ANCHORS, axis=2) + noise)
     rows = [",".join(f"{c}_length_mm" for c in ("tl", "tr", "bl", "br"))]
     (tmp_path / "log.csv").write_text("\n".join(rows + [",".join(map(str, r)) for r in lengths]))
