@@ -25,7 +25,7 @@ _AXES, _SIX = "xyz", ("xx", "yy", "zz", "xy", "xz", "yz")
 
 OF_A_LOG = (
     "*.length_offset", "*.swivel_offset", "tracker.*", "marker.*", "camera.*", "tag*.pose.*",
-    "tilt_zero.*", "clock",
+    "tilt_zero.*", "clock", "common_length_offset",
 )  # fmt: skip
 """Names, with *, of what fits find that does not change how a robot moves."""
 
@@ -58,7 +58,7 @@ def parameter_names(robot: Robot) -> tuple[str, ...]:
                 names.append(f"{owner}.{what}")
         if robot.winch.friction is not None:
             names += [f"{owner}.{what}" for what in OF_A_WINCH]
-    return (*names, "common_drum_radius")
+    return (*names, "common_drum_radius", "common_length_scale")
 
 
 def check_parameters(robot: Robot, names: tuple[str, ...]) -> None:
@@ -83,8 +83,8 @@ def changed_robot(robot: Robot, changes: Mapping[str, float]) -> Robot:
 
     Args:
         robot: The robot.
-        changes: What is added to parameters, by name, in SI units; of `length_scale`, the drum's
-            radius over what it was. Those of a log are left out.
+        changes: What is added to parameters, by name, in SI units; of `length_scale` and
+            `common_length_scale`, the drum's radius over what it was. Those of a log are left out.
 
     Raises:
         RobotFileError: A name is none of this robot's.
@@ -134,9 +134,10 @@ def _cable(robot: Robot, index: int, cable: Cable, changes: Mapping[str, float])
         own = cable.pulley_radius
         one.pulley_radius = (robot.pulley.radius if own is None else own) + of("pulley_radius")
     wider = of("drum_radius") + changes.get("common_drum_radius", 0.0)
-    if wider or of("length_scale"):
+    stretch = (1.0 + of("length_scale")) * (1.0 + changes.get("common_length_scale", 0.0))
+    if wider or stretch != 1.0:
         own = robot.winch.drum_radius if cable.drum_radius is None else cable.drum_radius
-        one.drum_radius = own * (1.0 + of("length_scale")) + wider
+        one.drum_radius = own * stretch + wider
     if of("stiffness") or of("retardation_time"):
         material, own_one = robot.materials()[index], cable.material or OwnMaterial()
         area = 0.25 * np.pi * material.diameter**2

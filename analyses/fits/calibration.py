@@ -446,6 +446,9 @@ def _details(calibration: Calibration, residuals: Mapping[str, Any]) -> dict[str
             + model.common_drum_radius + float(change)
             for cable, change in zip(task.robot.cables, model.drum_radius, strict=True)
         ]  # fmt: skip
+    for name, unit in (("common_length_offset", "_m"), ("common_length_scale", "")):
+        if name in names:
+            details[name + unit] = getattr(model, name)
     if any(name.startswith("tilt_zero") for name in names):
         details["tilt_zeros_rad"] = model.tilt_zero.tolist()
     if "clock" in names:

@@ -278,7 +278,8 @@ def _expected(
         home = np.zeros(lengths.shape[1])
         if task.zero is not None:
             home = Point(model, Stations.at([task.zero])).numbers[0, :, 0]
-        paid = (lengths - home - model.length_offset) / model.length_scale
+        offset = model.length_offset + model.common_length_offset
+        paid = (lengths - home - offset) / (model.length_scale * model.common_length_scale)
         if log.lengths is not None or log.angles is None:
             program.AddZeroedCables(paid, sigma, task.zero)
         else:

@@ -76,7 +76,7 @@ def calibrated_robot(
         mount: The camera's mounting that was calibrated.
     """
     model, moved = result.model, set(result.names)
-    cables = []
+    cables, stretch = [], model.common_length_scale
     for k, cable in enumerate(robot.cables):
         drum, pulley = cable.drum_radius, cable.pulley_radius
         if f"{cable.name}.drum_radius" in moved:
@@ -89,7 +89,7 @@ def calibrated_robot(
                 exit_point=cable.base_of(model.cables.p_WA[:, k]),
                 anchor_point=np.array(model.cables.p_PB[:, k]),
                 pulley_radius=pulley,
-                drum_radius=None if drum is None else drum + model.common_drum_radius,
+                drum_radius=None if drum is None else drum * stretch + model.common_drum_radius,
             )
         )
     cameras = [
@@ -105,6 +105,12 @@ def calibrated_robot(
         left.append(
             f"drum radii: the file has one for all, their mean; each over it: "
             f"{', '.join(f'{s / mean:.5f}' for s in scales)}"
+        )
+    if "common_length_scale" in moved:
+        winch = replace(winch, drum_radius=winch.drum_radius * stretch)
+        left.append(
+            f"the stretch of all lengths, {stretch:.6g}, is in the drum radii; that of a tape is "
+            "none of the robot's: undo it there"
         )
     if model.common_drum_radius:
         winch = replace(winch, drum_radius=winch.drum_radius + model.common_drum_radius)

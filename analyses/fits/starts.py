@@ -3,13 +3,14 @@
 A robot that measures nothing but itself has several minima: of the start as a whole, and of the
 pose of a row. Starts are compared by one cost: squares over sigma, in which an outlier costs 16
 (`OUTLIER` squared), so that to drop a row is no way to fit. A start that comes near a minimum that
-is known already goes no further; of its poses, those that lie elsewhere are tried there.
+is known already goes no further; of its poses, those that lie elsewhere are tried there. Whole
+lengths of a point mass tell a start without any frame; it counts where it ends lower than the rest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,8 @@ from cdpr_drake.analyses.logs.measurements import on_motion
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.elimination import MOST_STEPS
 from cdpr_drake.calibration.fit_groups import GroupFault, group_faults
+from cdpr_drake.calibration.guesses import unfolded_points
+from cdpr_drake.calibration.parameters import parameter_layout
 from cdpr_drake.calibration.pose_search import (
     HUBER,
     FoundPoses,
@@ -46,6 +49,9 @@ MOST_REFINEMENTS = 8
 
 GAIN = 1e-2
 """A cost that falls by more is better."""
+
+TRIAL_GAIN = 0.1
+"""Share by which a cost falls at least, for a trial of a single start to go on with refinements."""
 
 NEAR_PLACE, NEAR_TURN = 0.02, 0.1
 """Places this near in parts of the frame's size, and turns [rad], are on their way to one
@@ -135,16 +141,19 @@ def best_of_starts(setup: Setup, say: Callable[[str], None], others: bool = True
                 if at is None:
                     continue
             minimum = _solved(setup, program, at, straight=False)
-            minima.append(_improved(setup, minimum, []))
+            minima.append(_improved(setup, minimum, [], 0.0 if others else TRIAL_GAIN))
         except CalibrationError as refusal:
             failure = refusal
             if number == 0:
                 together = _from_one_pose(setup, starts[0])
                 minima += [] if together is None else [together]
+    say("Comparing starts")
+    unfolded = _unfolded(setup)
+    if unfolded is not None and all(unfolded.cost < minimum.cost - TIE for minimum in minima):
+        minima, pool = [unfolded], []
     if not minima:
         assert failure is not None
         raise failure
-    say("Comparing starts")
     best = min(upright_minima(setup, minima), key=lambda minimum: minimum.cost)
     if len(programs) > 1:
         pool += [minimum.result.stations for minimum in minima if minimum is not best]
@@ -169,6 +178,44 @@ def _from_one_pose(setup: Setup, start: StartPoint) -> Minimum | None:
         there = StartPoint(start.model, end.stations.poses())
         minimum = _solved(setup, setup.program(there), end, straight=False)
         return _improved(setup, minimum, [])
+    except CalibrationError:
+        return None
+
+
+def _unfolded(setup: Setup) -> Minimum | None:
+    """The minimum from exit points and places that whole lengths of a point mass tell alone; None:
+    they do not, or something is known of these points."""
+    task, model, motion = setup.task, setup.model, setup.freedom.motion
+    if not (motion.is_point and task.blind) or setup.lengths is None or setup.zeroed:
+        return None
+    free, slices = setup.free((*task.priors, *task.bounds)), parameter_layout(model).slices
+    known = setup.first.rotation().matrix()
+    basis, home = motion.basis(known)[3:], setup.first.translation()
+    points = free[slices["exit_points"]].reshape(-1, 3)[:, np.any(basis != 0.0, axis=1)]
+    counted = any(setup.free()[slices[key]].any() for key in ("length_offsets", "length_scales"))
+    whole = np.isfinite(setup.lengths).all(axis=1)
+    if counted or not (points.all() and whole.any()):
+        return None
+    believed = (model.cables.p_WA - known @ model.cables.p_PB).T - home
+    inside = believed @ basis
+    across = np.sum(believed**2, axis=1) - np.sum(inside**2, axis=1)
+    flat = np.sqrt(np.maximum(setup.lengths[whole] ** 2 - across, 0.0))
+    unfolded = unfolded_points(flat, basis.shape[1])
+    if unfolded is None:
+        return None
+    anchors, places = (x - unfolded[0].mean(axis=0) for x in unfolded)
+    middle = inside.mean(axis=0)
+    U, _, Vt = np.linalg.svd(anchors.T @ (inside - middle))  # a mirror image may be nearer
+    anchors, places = (x @ U @ Vt + middle for x in (anchors, places))
+    p_WA = model.cables.p_WA + basis @ (anchors - inside).T
+    rows = np.arange(task.log.count)
+    places = np.array([np.interp(rows, rows[whole], column) for column in places.T]).T
+    poses = [RigidTransform(setup.first.rotation(), home + basis @ place) for place in places]
+    try:
+        program = setup.program(StartPoint(model, poses))
+        start = replace(model, cables=replace(model.cables, p_WA=p_WA))
+        at = Point(start, program.stations, program.layout)
+        return _improved(setup, _solved(setup, program, at, straight=False), [])
     except CalibrationError:
         return None
 
@@ -226,8 +273,11 @@ def _close(setup: Setup, R: Array, p: Array, S: Array, q: Array) -> npt.NDArray[
     return np.asarray((apart < NEAR_PLACE * size) & (turned < NEAR_TURN))
 
 
-def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minimum:
-    """The same from poses that are sought anew, as some first end in wrong minima; while better."""
+def _improved(
+    setup: Setup, minimum: Minimum, pool: Sequence[Stations], least: float = 0.0
+) -> Minimum:
+    """The same from poses that are sought anew, as some first end in wrong minima; while better, by
+    a share at least."""
     for _ in range(MOST_REFINEMENTS):
         rows, ends, here = _elsewhere(setup, minimum, pool, every=False)
         better = ends.costs < here[rows] - GAIN
@@ -245,9 +295,12 @@ def _improved(setup: Setup, minimum: Minimum, pool: Sequence[Stations]) -> Minim
             again = _solved(setup, minimum.program, start, straight=True)
         except CalibrationError:  # poses that are better alone leave something untold
             break
-        if again.cost >= minimum.cost - GAIN:
+        gain = minimum.cost - again.cost
+        if gain <= GAIN:
             break
         minimum = again
+        if gain < least * minimum.cost:
+            break
     return minimum
 
 

@@ -173,8 +173,11 @@ def impossible_poses(
 
 
 def far_outside(robot: Robot, result: CalibrationResult) -> npt.NDArray[np.bool_]:
-    """Flags of poses that are farther out of the robot's frame than it is large, shape (k,)."""
-    lower, upper = np.asarray(robot.frame.lower, float), np.asarray(robot.frame.upper, float)
+    """Flags of poses that are farther out of the robot's frame, and of its exit points as fitted,
+    than these are large, shape (k,)."""
+    exits = result.model.cables.p_WA
+    lower = np.minimum(robot.frame.lower, exits.min(axis=1))
+    upper = np.maximum(robot.frame.upper, exits.max(axis=1))
     size = float(np.max(upper - lower))
     p = result.stations.p
     return np.asarray(np.any((p < lower - size) | (p > upper + size), axis=1))

@@ -29,21 +29,25 @@ Wolfowitz, On a test whether two samples are from the same population, 1940, for
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from scipy.linalg import eigh
-from scipy.optimize import nnls
 from scipy.special import comb, gammaln
 from scipy.stats import binom, hypergeom, norm, t
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.calibration.elimination import MOST_POSES, UNTOLD, LeastSquares
+from cdpr_drake.calibration.elimination import LeastSquares
 from cdpr_drake.calibration.pose_search import OUTLIER
-from cdpr_drake.calibration.result import CalibrationResult, used_rows
-from cdpr_drake.calibration.stations import POSE, Point
+from cdpr_drake.calibration.projected_residuals import (
+    END_ROWS,
+    LEAST_SEEN,
+    Flags,
+    ProjectedResiduals,
+    Rows,
+)
+from cdpr_drake.calibration.result import CalibrationResult
+from cdpr_drake.calibration.stations import Point
 
 FALSE_ALARM = 1e-4
 """Probability that noise alone makes a log a misfit; of 200 logs, 2 % have a false alarm. Each of n
@@ -55,9 +59,8 @@ LIKELY = 1e-2
 MOST_DROPPED = 0.1
 """Share of the readings of a sensor or a kind that may be thrown out."""
 
-SINGLE_OUTLIERS, TRUNCATED = 0.02, 1.1
-"""Share that single outliers are expected to be, and by how much the scatter is larger than that of
-the readings that remain, where noise is twice its sigma."""
+SINGLE_OUTLIERS = 0.02
+"""Share that single outliers are expected to be."""
 
 MOST_ROWS = 0.05
 """Share of rows, or one row, that may have lost a single reading of which none but itself tells."""
@@ -76,27 +79,11 @@ of these deviations, poses are then within 2.7 of them."""
 LARGEST_CHANGE = 3.0
 """A factor that differs from 1 by more is none: a sign makes 2, and units are seen at once."""
 
-END_ROWS = 3
-"""Rows on each side of an instant at which a log is split, at least."""
-
 RUNNING = 5
 """Rows of a running mean."""
 
-LEAST_SEEN = 1e-6
-"""Share of an error that residuals show; of less, poses and parameters follow it."""
-
-LEAST_COMPONENT = 0.1
-"""A variance component is no smaller than this share of the kind's own mean square over its degrees
-of freedom, which holds where readings of few degrees leave components undecided."""
-
-LEAST_DEGREES = 0.5
-"""Degrees of freedom from which on a kind tells its own scatter; below, that of all is taken."""
-
 MOST_NUMBERS = 2_000_000
 """Numbers of the errors that are projected at a time."""
-
-Rows = npt.NDArray[np.intp]
-Flags = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -135,13 +122,13 @@ def group_faults(problem: LeastSquares, result: CalibrationResult) -> tuple[Grou
         problem: What was solved, with the rows that were dropped.
         result: Its minimum.
     """
-    residuals = _Residuals(problem, Point(result.model, result.stations), result.pose_std)
+    residuals = ProjectedResiduals(problem, Point(result.model, result.stations), result.pose_std)
     lost = [*_explained_rows(residuals), *_undecided_rows(residuals), *_dropped(residuals)]
     systematic = _systematic(residuals) if residuals.degrees > 1.0 else []
     return (*lost, *sorted(systematic, key=lambda fault: fault.probability))
 
 
-def _dropped(residuals: _Residuals) -> Iterator[GroupFault]:
+def _dropped(residuals: ProjectedResiduals) -> Iterator[GroupFault]:
     """Sensors, such as roll or the length of a cable, of which too much was thrown out; and kinds
     of measurement of which too much was, though each sensor lost little."""
     lost, measured = residuals.lost, residuals.measured
@@ -169,7 +156,7 @@ def _dropped(residuals: _Residuals) -> Iterator[GroupFault]:
         yield from found if whole is None else [whole]
 
 
-def _undecided_rows(residuals: _Residuals) -> Iterator[GroupFault]:
+def _undecided_rows(residuals: ProjectedResiduals) -> Iterator[GroupFault]:
     """Rows that lost more than remains to check their pose: which readings are right is open."""
     freedom = residuals.problem.freedom.count(residuals.at.stations.width)
     spare = np.maximum(residuals.used.sum(axis=1) - freedom, 0)
@@ -191,7 +178,7 @@ def _undecided_rows(residuals: _Residuals) -> Iterator[GroupFault]:
     )  # fmt: skip
 
 
-def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
+def _explained_rows(residuals: ProjectedResiduals) -> Iterator[GroupFault]:
     """Rows in which nothing has to be thrown out once all they measured of a kind has a factor.
 
     One factor of several such rows is no chance: outliers have no reason to agree with one.
@@ -201,7 +188,7 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
     if len(rows) < FEWEST_EXPLAINED:
         return
     for kind, columns in zip(residuals.kinds, residuals.columns, strict=True):
-        off, seen, c, _ = _own_factors(residuals, rows, columns, residuals.measured)
+        off, seen, c = _own_factors(residuals, rows, columns, residuals.measured)
         before, after = (np.max(np.abs(x), axis=1) for x in (off, off - c[:, None] * seen))
         clear = after < np.maximum(LEFT_OVER * before, np.minimum(OUTLIER, HALF * before))
         middle = float(np.median(c[clear])) if clear.any() else 0.0
@@ -217,20 +204,10 @@ def _explained_rows(residuals: _Residuals) -> Iterator[GroupFault]:
 
 
 def _own_factors(
-    residuals: _Residuals, rows: Rows, columns: Rows, counted: Flags
-) -> tuple[Array, Array, Array, Array]:
-    """Factors of some columns that rows need by themselves, the model as it is.
-
-    Args:
-        residuals: All of them.
-        rows: Rows k that are looked at.
-        columns: What the factor multiplies.
-        counted: Readings that count, of all rows.
-
-    Returns:
-        Residuals and errors for a change of 1 behind the poses alone, each shape (k, R); the change
-        of the factor, shape (k,), zero where it is not seen; and the error before, (k, R).
-    """
+    residuals: ProjectedResiduals, rows: Rows, columns: Rows, counted: Flags
+) -> tuple[Array, Array, Array]:
+    """Factors of columns that each of some rows needs by itself, the model as it is: residuals and
+    errors for a change of 1 behind the poses alone, both (k, R), and the change, (k,), or zero."""
     counts = counted[rows]
     B = residuals.slopes[rows] * counts[:, :, None]
     d = np.zeros(counts.shape)
@@ -243,7 +220,7 @@ def _own_factors(
     size = np.sum(seen**2, axis=1)
     told = size > LEAST_SEEN * np.sum(d**2, axis=1)
     c = np.where(told, np.sum(d * off, axis=1) / np.where(told, size, 1.0), 0.0)
-    return off, seen * told[:, None], c, d
+    return off, seen * told[:, None], c
 
 
 def _row_words(rows: Sequence[int] | Rows) -> str:
@@ -251,138 +228,6 @@ def _row_words(rows: Sequence[int] | Rows) -> str:
     numbers = ", ".join(str(row + 1) for row in rows[:8])
     more = f" and {len(rows) - 8} more" if len(rows) > 8 else ""
     return f"row{'s' if len(rows) > 1 else ''} {numbers}{more}"
-
-
-class _Residuals:
-    """Residuals at a minimum, and the projector M that is behind them.
-
-    All arrays are over sigma and in typical sizes; rows of all terms stand beside each other.
-
-    Attributes:
-        r: Residuals, shape (k, R); zero where none counts.
-        whole: Those of readings that were thrown out as well.
-        expected: What the fit expects, shape (k, R); zero where a factor means nothing. Measured
-            values would not do: the noise in them fits itself with a factor of 0.
-        slopes: Derivatives by poses of all that was measured, shape (k, R, q).
-        measured, used, lost: Readings by what became of them, each shape (k, R).
-        names, units, sigma: Of columns; sigma has shape (k, R).
-        kinds, columns, scatter: Of each kind its name, columns, and s_g.
-        noise: Scatter with that of the readings that were thrown out, shape (g,); at least 1.
-        gross: Readings that were thrown out and are no such noise, shape (k, R).
-        degrees, degrees_of: Degrees of freedom, trace of M; and of each kind.
-        told: Whether a kind tells its own scatter, shape (g,).
-    """
-
-    def __init__(self, problem: LeastSquares, at: Point, pose_std: Array) -> None:
-        self.problem, self.at, self.pose_std = problem, at, pose_std
-        terms = problem.terms
-        self.measured = np.concatenate([term.measured() for term in terms], axis=1)
-        self.used = np.concatenate([used_rows(problem, k) for k in range(len(terms))], axis=1)
-        self.lost = self.measured & ~self.used
-        widths = [term.measured().shape[1] for term in terms]
-        ends = np.cumsum(widths)
-        self.kinds = [term.kind for term in terms]
-        self.columns = [
-            np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)
-        ]
-        self.members = np.array([np.isin(np.arange(ends[-1]), own) for own in self.columns], float)
-        every = [(term, c) for term, width in zip(terms, widths, strict=True) for c in range(width)]
-        self.names = [term.row_name(c, at.model.names) for term, c in every]
-        self.units = [term.row_unit(c) for term, c in every]
-        self.sigma = np.concatenate([term.sigmas() for term in terms], axis=1)
-        blocks = replace(problem, dropped=None).blocks(at)
-        parts = [part.evaluate(there) for part, there in blocks]
-        self.whole, A, self.slopes = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        values = np.nan_to_num(np.concatenate([term.values(at) for term in terms], axis=1))
-        valued = self.measured & np.any(values != 0.0, axis=0)
-        self.expected = np.where(valued, values / self.sigma + self.whole, 0.0)
-        self.r = np.where(self.used, self.whole, 0.0)
-        A, B = (np.where(self.used[:, :, None], x, 0.0) for x in (A, self.slopes))
-        self._A, self._B = A, B
-        H = np.swapaxes(B, 1, 2) @ B
-        self._Bt = np.linalg.solve(H, np.swapaxes(B, 1, 2))  # (k, q, R)
-        self.A = A - B @ (self._Bt @ A)
-        typical = at.layout.typical[problem.free]
-        self._prior = problem.prior.evaluate(at, problem.free)[1] * typical
-        flat = self.A.reshape(self.r.size, A.shape[2])
-        self._inverse = _told_inverse(flat.T @ flat + self._prior.T @ self._prior)
-        self._components()
-        self.noise = np.maximum(1.0, TRUNCATED * self.scatter)
-        self.gross = self.lost & (np.abs(self.whole) > OUTLIER * (self.noise @ self.members))
-
-    def _components(self) -> None:
-        """Degrees of freedom and scatter of each kind, by variance components."""
-        count, V = len(self.members), self._inverse
-        own = np.where(self.used, 1.0, 0.0)
-        traces, both = [], []
-        for begin in range(0, len(own), MOST_POSES):
-            some = slice(begin, begin + MOST_POSES)
-            rest = np.eye(own.shape[1]) * own[some][:, :, None] - self._B[some] @ self._Bt[some]
-            hat = self.A[some] @ V @ np.swapaxes(self.A[some], 1, 2)
-            traces.append(np.einsum("krr->r", rest - hat))
-            both.append(np.sum(rest**2 - 2.0 * rest * hat, axis=0))
-        self.degrees_of = self.members @ sum(traces[1:], traces[0])
-        self.degrees = float(self.degrees_of.sum())
-        S = [
-            np.einsum("krf,krh->fh", self.A * own, self.A) for own in self.members[:, None, :, None]
-        ]
-        squares = self.members @ sum(both[1:], both[0]) @ self.members.T
-        P = self._prior.T @ self._prior
-        squares += [[np.sum((V @ S[a]) * (V @ S[b]).T) for b in range(count)] for a in range(count)]
-        known = np.array([np.sum((V @ S[a]) * (V @ P).T) for a in range(count)])
-        self.sums = self.members @ np.sum(self.r**2, axis=0)
-        found, _ = nnls(squares, np.maximum(self.sums - known, 0.0))
-        self.told = self.degrees_of > LEAST_DEGREES
-        plain = self.sums / np.where(self.told, self.degrees_of, np.inf)
-        pooled = self.sums.sum() / max(self.degrees, LEAST_DEGREES)
-        squares_of = np.where(self.told, np.maximum(found, LEAST_COMPONENT * plain), pooled)
-        self.scatter = np.sqrt(squares_of + 1e-30)
-
-    def likely_instant(self, error: Array) -> Rows:
-        """Rows from an instant on in which an error explains most of the residuals."""
-        rest = error - np.einsum("krq,kq->kr", self._B, np.einsum("kqr,kr->kq", self._Bt, error))
-        follows = np.einsum("krf,kr->kf", self.A, error)
-        sums = [np.sum(x, axis=1) for x in (error * rest, self.r * error, error**2)]
-        size, along, whole, a = (np.cumsum(x[::-1], axis=0)[::-1] for x in (*sums, follows))
-        size = size - np.einsum("kf,kf->k", a @ self._inverse, a)
-        told = size > LEAST_SEEN * whole
-        told[:END_ROWS] = told[max(len(told) - END_ROWS + 1, 0) :] = False
-        first = int(np.argmax(np.where(told, along**2 / np.where(told, size, 1.0), 0.0)))
-        return np.arange(first or len(told), len(told))
-
-    def projected(self, D: Array) -> tuple[Array, Array]:
-        """M D of directions, shape (k, R, n), and its prior rows, shape (p, n)."""
-        D = D - self._B @ (self._Bt @ D)
-        along = self._inverse @ np.einsum("krf,krn->fn", self.A, D)
-        return D - self.A @ along, -self._prior @ along
-
-    def moves(self, error: Array) -> float:
-        """By how many stated deviations poses move by an error, root mean square.
-
-        Args:
-            error: Of residuals over sigma, shape (k, R).
-        """
-        eliminated = error - np.einsum("krq,kqs,ks->kr", self._B, self._Bt, error)
-        theta = self._inverse @ np.einsum("krf,kr->f", self.A, eliminated)
-        rest = error - self._A @ theta
-        steps = (self._Bt @ rest[:, :, None])[:, :, 0] * self.problem.station_scale(self.at)
-        stations = self.at.stations
-        wide = self.problem.freedom.widen(steps, stations.R, stations.width)
-        sizes = np.column_stack(
-            [np.linalg.norm(wide[:, :3], axis=1), np.linalg.norm(wide[:, 3:POSE], axis=1)]
-        )
-        with np.errstate(invalid="ignore", divide="ignore"):
-            ratios = np.where(self.pose_std > 0.0, sizes / self.pose_std, 0.0)
-        return float(np.max(np.sqrt(np.mean(ratios**2, axis=0))))
-
-
-def _told_inverse(S: Array) -> Array:
-    """Inverse of an information in what it tells, as `symmetric_solve` has it."""
-    if not len(S):
-        return S
-    values, V = eigh(0.5 * (S + S.T))
-    told = values > UNTOLD**2
-    return np.asarray((V[:, told] / values[told]) @ V[:, told].T)
 
 
 class _Error(NamedTuple):
@@ -406,14 +251,14 @@ class _Error(NamedTuple):
     error: Array
 
 
-def _systematic(residuals: _Residuals) -> list[GroupFault]:
+def _systematic(residuals: ProjectedResiduals) -> list[GroupFault]:
     """Factors, delays, jumps, splits, rows and runs that are certain."""
     errors = _errors(residuals)
     faults = list(_tested(residuals, errors)) if errors else []
     return faults + _runs(residuals, FALSE_ALARM / residuals.r.shape[1])
 
 
-def _errors(residuals: _Residuals) -> list[_Error]:
+def _errors(residuals: ProjectedResiduals) -> list[_Error]:
     """Errors that are tested; of jumps, splits and sets of rows the most likely one."""
     count, used, v = len(residuals.r), residuals.used, residuals.expected
     errors: list[_Error] = []
@@ -449,14 +294,14 @@ def _errors(residuals: _Residuals) -> list[_Error]:
     return errors
 
 
-def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
+def _likely_rows(residuals: ProjectedResiduals, columns: Rows) -> Rows:
     """The fewer of two groups of rows that differ most in the factor of some columns; none where
     that is no more than chance.
 
     Two groups of numbers with weights w differ by W_1 W_2 / (W_1 + W_2) (c_1 - c_2)^2, which grows
     by about 2 log C(N, n) if n of N are chosen for it.
     """
-    _, seen, c, _ = _own_factors(residuals, np.arange(len(residuals.r)), columns, residuals.used)
+    _, seen, c = _own_factors(residuals, np.arange(len(residuals.r)), columns, residuals.used)
     w = np.sum(seen**2, axis=1)
     order = np.flatnonzero(w > 0.0)
     order = order[np.argsort(c[order])]
@@ -476,7 +321,7 @@ def _likely_rows(residuals: _Residuals, columns: Rows) -> Rows:
     return np.sort(order[:cut] if 2 * cut <= len(order) else order[cut:])
 
 
-def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFault]:
+def _tested(residuals: ProjectedResiduals, errors: Sequence[_Error]) -> Iterator[GroupFault]:
     """Those of some errors that are likely, one of each test and quantity."""
     best: dict[tuple[str, str], GroupFault] = {}
     at_once = max(1, MOST_NUMBERS // residuals.r.size)
@@ -486,7 +331,7 @@ def _tested(residuals: _Residuals, errors: Sequence[_Error]) -> Iterator[GroupFa
 
 
 def _test(
-    residuals: _Residuals,
+    residuals: ProjectedResiduals,
     errors: Sequence[_Error],
     tests: int,
     best: dict[tuple[str, str], GroupFault],
@@ -519,16 +364,10 @@ def _test(
 
 
 def _variance(
-    residuals: _Residuals, sums: Array, degrees: Array, weights: Array
+    residuals: ProjectedResiduals, sums: Array, degrees: Array, weights: Array
 ) -> tuple[float, float]:
-    """Of d' r, and its degrees of freedom by Satterthwaite.
-
-    Args:
-        residuals: All of them.
-        sums: Squares of the residuals of each kind once the error is out, shape (g,).
-        degrees: Their degrees of freedom, shape (g,).
-        weights: Squares of M d in each kind, shape (g,).
-    """
+    """Variance of d' r, and its degrees of freedom by Satterthwaite; of each kind squares of the
+    residuals once the error is out, their degrees of freedom, and squares of M d, each (g,)."""
     told = residuals.told & (residuals.sums > 0.0)
     before = np.where(told, residuals.sums / np.where(told, residuals.degrees_of, 1.0), 1.0)
     after = np.where(told, sums / np.maximum(degrees, 1e-9), 1.0)
@@ -540,7 +379,7 @@ def _variance(
 
 
 def _fault(
-    residuals: _Residuals, one: _Error, found: tuple[float, float, float], certain: bool
+    residuals: ProjectedResiduals, one: _Error, found: tuple[float, float, float], certain: bool
 ) -> GroupFault:
     """An error of some size, deviation and probability, in words, and whether it counts."""
     c, std, chance = found
@@ -562,7 +401,7 @@ def _fault(
     )  # fmt: skip
 
 
-def _runs(residuals: _Residuals, level: float) -> list[GroupFault]:
+def _runs(residuals: ProjectedResiduals, level: float) -> list[GroupFault]:
     """The sensor whose residuals change their sign too seldom, row by row: a drift.
 
     It counts where poses would move by the running mean of its residuals.

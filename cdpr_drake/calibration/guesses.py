@@ -1,4 +1,4 @@
-"""Where a search begins: tags from images, a tracker's frame from poses."""
+"""Where a search begins: tags from images, a tracker's frame from poses, anchors from lengths."""
 
 from __future__ import annotations
 
@@ -129,6 +129,48 @@ def _both_frames(
     right = np.concatenate([R_WK @ Y.translation() - X.translation() for X, Y in pairs])
     p = np.linalg.lstsq(rows, right, rcond=None)[0]
     return RigidTransform(R_WK, p[3:]), RigidTransform(R_PM, p[:3])
+
+
+def unfolded_points(lengths: Array, dimension: int) -> tuple[Array, Array] | None:
+    """Anchors and places of a point mass from whole cable lengths alone, in some frame, mirrored or
+    not; None: the lengths do not tell them.
+
+    Differences of squared lengths against the first cable are bilinear in places and anchors, so
+    their centred table has the rank of the space, and its factors are both but for an affine map.
+    The map follows from the squared lengths themselves, which are linear in its square.
+
+    Args:
+        lengths: Shape (k, m) [m].
+        dimension: Of the space in which the mass moves, d.
+
+    Returns:
+        Anchors, shape (m, d), and places, shape (k, d) [m].
+
+    Source: Pollefeys and Nister, Direct computation of sound and microphone locations from
+    time-difference-of-arrival data, 2008.
+    """
+    d, squared = dimension, lengths**2
+    one, two = np.triu_indices(d)
+    if lengths.shape[1] <= d or len(lengths) <= len(one) + d + 1:
+        return None
+    table = squared[:, 1:] - squared[:, :1]
+    U, s, Vt = np.linalg.svd(table - table.mean(axis=0), full_matrices=False)
+    Y = U[:, :d] * s[:d]
+    twice = np.where(one == two, 1.0, 2.0)
+    rows = np.column_stack([twice * Y[:, one] * Y[:, two], 2.0 * Y, np.ones(len(Y))])
+    size = np.linalg.norm(rows, axis=0)
+    if np.min(size) == 0.0:
+        return None
+    found = np.linalg.lstsq(rows / size, squared[:, 0], rcond=None)[0] / size
+    S = np.empty((d, d))
+    S[one, two] = S[two, one] = found[: len(one)]
+    try:
+        T = np.linalg.cholesky(S)
+    except np.linalg.LinAlgError:
+        return None
+    anchors = np.zeros((lengths.shape[1], d))
+    anchors[1:] = -0.5 * np.linalg.solve(T, Vt[:d]).T
+    return anchors, Y @ T + np.linalg.solve(T, found[len(one) : len(one) + d])
 
 
 def _middle(poses: Sequence[RigidTransform]) -> RigidTransform:

@@ -33,7 +33,8 @@ def simulated_lengths(
         random: Where noise comes from.
     """
     lengths = Point(model, Stations.at(poses)).numbers[:, :, LENGTH]
-    counted = start + (lengths - start - model.length_offset) / model.length_scale
+    offset = model.length_offset + model.common_length_offset
+    counted = (start + (lengths - start - offset) / model.length_scale) / model.common_length_scale
     return np.asarray(counted + sigma * random.standard_normal(counted.shape))
 
 

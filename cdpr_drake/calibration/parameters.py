@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -60,14 +61,26 @@ GROUPS = {
         "tilt_zero", "tilt's zero", ("roll", "pitch", "yaw"), ("rad",) * 3, (0.05,) * 3, "robot"
     ),
     "clock": ParameterGroup("clock", "tracker's clock", (), ("s",), (0.01,), "robot"),
+    "common_length_offset": ParameterGroup(
+        "common_length_offset", "offset of all lengths", (), ("m",), (0.01,), "robot"
+    ),
+    "common_length_scale": ParameterGroup(
+        "common_length_scale", "stretch of all lengths", (), ("-",), (0.01,), "robot"
+    ),
 }
 """Kinds of parameters in the order of the vector.
 
 `length_scales` are drum radii over those of the robot's file: cable that is counted times the scale
 is cable that is paid out. `drum_radii` are by how much each drum is larger, beside
 `common_drum_radius` of all; with layers on a drum these turn motor angles into lengths otherwise
-than a scale. `clock` is by how much a tracker is late. Turns (rx, ry, rz) of the camera and of a
-tracker's marker are about the axes of P, of tags and of the tracker's frame about those of W."""
+than a scale. `common_length_scale` multiplies all readings, from zero on, and
+`common_length_offset` is added to all lengths: one tape or one encoder's scale. `clock` is by how
+much a tracker is late. Turns (rx, ry, rz) of the camera and of a tracker's marker are about the
+axes of P, of tags and of the tracker's frame about those of W."""
+
+OF_CABLES = {"exit_points": "p_WA", "anchor_points": "p_PB", "pulley_radii": "pulley_radius"}
+OWN_FIELDS = {"camera": "X_PC", "tags": "tags", "tracker": "X_WK", "marker": "X_PM"}
+"""Fields of groups in the cables of a model, and in itself where they are not `single`."""
 
 POSE_GROUPS = tuple(key for key, group in GROUPS.items() if group.parts == _POSE[0])
 """Groups whose members are poses: turns, which do not add up, then translations."""
@@ -91,6 +104,8 @@ class CalibrationModel:
         common_drum_radius: By how much all of them are larger, besides [m].
         tilt_zero: Roll, pitch and yaw at which a tilt sensor reads zero, shape (3,) [rad].
         clock: By how much a tracker is late [s].
+        common_length_offset: Further part of all length offsets [m].
+        common_length_scale: Factor of all readings of lengths, from zero on [-].
     """
 
     names: tuple[str, ...]
@@ -106,6 +121,8 @@ class CalibrationModel:
     common_drum_radius: float = 0.0
     tilt_zero: Array = field(default_factory=lambda: np.zeros(3))
     clock: float = 0.0
+    common_length_offset: float = 0.0
+    common_length_scale: float = 1.0
 
     def __post_init__(self) -> None:
         """Fills in what was left out.
@@ -235,32 +252,31 @@ def moved_model(
     Raises:
         CableModelError: A pulley's radius would be negative.
     """
-    m, at = model.cables.count, (layout or parameter_layout(model)).slices
-    points = {"p_WA": "exit_points", "p_PB": "anchor_points"}
-    changes = {
-        name: getattr(model.cables, name) + step[at[key]].reshape(m, 3).T
-        for name, key in points.items()
-    }
-    radius = model.cables.pulley_radius + step[at["pulley_radii"]]
-    twists = step[at["tags"]].reshape(-1, 6)
-    return replace(
-        model,
-        cables=replace(model.cables, pulley_radius=radius, **changes),
-        X_PC=turned(model.X_PC, step[at["camera"]]),
-        tags={
-            tag: turned(X, twist)
-            for (tag, X), twist in zip(model.tags.items(), twists, strict=True)
-        },
-        length_offset=model.length_offset + step[at["length_offsets"]],
-        length_scale=model.length_scale + step[at["length_scales"]],
-        swivel_offset=model.swivel_offset + step[at["swivel_offsets"]],
-        X_WK=turned(model.X_WK, step[at["tracker"]]),
-        X_PM=turned(model.X_PM, step[at["marker"]]),
-        drum_radius=model.drum_radius + step[at["drum_radii"]],
-        common_drum_radius=model.common_drum_radius + float(step[at["common_drum_radius"]][0]),
-        tilt_zero=model.tilt_zero + step[at["tilt_zeros"]],
-        clock=model.clock + float(step[at["clock"]][0]),
-    )
+    at = (layout or parameter_layout(model)).slices
+    of_cables: dict[str, Any] = {}
+    own: dict[str, Any] = {}
+    for key, part in ((key, step[where]) for key, where in at.items()):
+        value: Any = _value(model, key)
+        if key == "tags":
+            twists = part.reshape(-1, 6)
+            value = {tag: turned(X, t) for (tag, X), t in zip(value.items(), twists, strict=True)}
+        elif key in POSE_GROUPS:
+            value = turned(value, part)
+        elif isinstance(value, float):
+            value += float(part[0])
+        else:
+            value = value + (part.reshape(-1, 3).T if value.ndim == 2 else part)
+        (of_cables if key in OF_CABLES else own)[_field(key)] = value
+    return replace(model, cables=replace(model.cables, **of_cables), **own)
+
+
+def _field(key: str) -> str:
+    """Name of a group's values in a model, or in its cables."""
+    return OF_CABLES.get(key) or OWN_FIELDS.get(key) or GROUPS[key].single
+
+
+def _value(model: CalibrationModel, key: str) -> Any:
+    return getattr(model.cables if key in OF_CABLES else model, _field(key))
 
 
 def moved_frames(model: CalibrationModel, twists: Array) -> CalibrationModel:
@@ -286,22 +302,15 @@ def moved_frames(model: CalibrationModel, twists: Array) -> CalibrationModel:
 
 def model_difference(model: CalibrationModel, other: CalibrationModel) -> Array:
     """The step that leads from another model to this one, shape (n,); inverse of `moved_model`."""
-    parts = [
-        (model.cables.p_WA - other.cables.p_WA).T.ravel(),
-        (model.cables.p_PB - other.cables.p_PB).T.ravel(),
-        model.length_offset - other.length_offset,
-        model.length_scale - other.length_scale,
-        model.cables.pulley_radius - other.cables.pulley_radius,
-        model.swivel_offset - other.swivel_offset,
-        pose_step(model.X_PC, other.X_PC),
-        *(pose_step(X, other.tags[tag]) for tag, X in model.tags.items()),
-        pose_step(model.X_WK, other.X_WK),
-        pose_step(model.X_PM, other.X_PM),
-        model.drum_radius - other.drum_radius,
-        np.array([model.common_drum_radius - other.common_drum_radius]),
-        model.tilt_zero - other.tilt_zero,
-        np.array([model.clock - other.clock]),
-    ]
+    parts = []
+    for key in GROUPS:
+        one, before = _value(model, key), _value(other, key)
+        if key == "tags":
+            parts += [pose_step(X, before[tag]) for tag, X in one.items()]
+        elif key in POSE_GROUPS:
+            parts.append(pose_step(one, before))
+        else:
+            parts.append(np.ravel(np.transpose(one - before)))
     return np.concatenate(parts)
 
 

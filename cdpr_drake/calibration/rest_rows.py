@@ -140,18 +140,24 @@ def _groups(time: Array, tables: list[Array], forces: Array) -> tuple[list[slice
     for begin in np.flatnonzero(slow):
         unmoved[begin : begin + size] = True
     ends = np.flatnonzero(np.diff(np.concatenate([[False], linked, [False]]).astype(int)))
+    first, stop = ends.reshape(-1, 2).T - [[1], [0]]
+    alone = np.ones(len(first), bool)  # a short group beside another is the way there
+    alone[1:] &= first[1:] > stop[:-1]
+    alone[:-1] &= first[1:] > stop[:-1]
     groups = [
         part
-        for first, stop in ends.reshape(-1, 2)
-        for part in _split(slice(int(first) - 1, int(stop)), tables, limits, size)
+        for group, lone in zip(map(slice, first.tolist(), stop.tolist()), alone, strict=True)
+        if lone or group.stop - group.start >= size
+        for part in _split(group, tables, limits, size)
     ]
     return groups, unmoved, is_motion
 
 
 def _split(group: slice, tables: list[Array], limits: list[float], least: int) -> list[slice]:
-    """Parts of a group of some rows at least, in which every row is near the median."""
+    """A group in which every row is near the median, of half of some rows at least, as of a stop no
+    longer than a window; else its parts of so many rows at least in which every row is."""
     count = group.stop - group.start
-    if count < least:
+    if count < max(FEWEST_ROWS, least // 2):
         return []
     near = np.ones(count, bool)
     for table, limit in zip(tables, limits, strict=True):
@@ -164,7 +170,11 @@ def _split(group: slice, tables: list[Array], limits: list[float], least: int) -
         return []
     begin, end = max(runs.reshape(-1, 2).tolist(), key=lambda run: run[1] - run[0])
     cuts = [group.start, group.start + begin, group.start + end, group.stop]
-    return [part for a, b in pairwise(cuts) for part in _split(slice(a, b), tables, limits, least)]
+    return [
+        part
+        for a, b in pairwise(cuts) if b - a >= least
+        for part in _split(slice(a, b), tables, limits, least)
+    ]  # fmt: skip
 
 
 def _lines(t: Array, table: Array) -> tuple[Array, Array]:

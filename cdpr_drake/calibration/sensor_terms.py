@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.stations import POSE, Point, crosses, inverse_turn_slope, turn_vectors
-from cdpr_drake.calibration.terms import EVERY_ROW, Slopes, Term
+from cdpr_drake.calibration.terms import EVERY_ROW, Parts, Slopes, Term
 from cdpr_drake.vision.pinhole import Pinhole
 
 NEAREST = 1e-6
@@ -39,9 +39,9 @@ class TrackedPoses(Term):
     kind = "tracked poses"
     unit = "rad, m"
     by_pose = ("R", "p")
+    row_names = tuple(f"tracker, {what} {axis}" for what in ("turn", "place") for axis in "xyz")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
+    def parts(self, at: Point) -> Parts:
         seen = self.measured()
         X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
         R_WK = X_WK.rotation().matrix()
@@ -54,25 +54,26 @@ class TrackedPoses(Term):
         B = at.blank(6)
         B[:, :3, :3], B[:, 3:, :3] = slope, -crosses(lever)
         B[:, 3:, 3:POSE] = np.eye(3)
-        tracker, marker = (at.layout.slices[key].start for key in ("tracker", "marker"))
-        first, last = slice(3), slice(3, 6)
-        # exp(w) R_WK stands transposed and last in the turn: its slope is that of minus the turn.
-        slopes: Slopes = [
-            (first, slice(tracker, tracker + 3), -inverse_turn_slope(-turns)),
-            (last, slice(tracker, tracker + 3), crosses(p)),
-            (last, slice(tracker + 3, tracker + 6), -np.eye(3)),
-            (first, slice(marker, marker + 3), slope @ R_WP),
-            (last, slice(marker + 3, marker + 6), R_WP),
-        ]
+
+        def slopes() -> Slopes:
+            tracker, marker = (at.layout.slices[key].start for key in ("tracker", "marker"))
+            first, last = slice(3), slice(3, 6)
+            # exp(w) R_WK stands transposed and last in the turn: its slope is that of minus it.
+            return [
+                (first, slice(tracker, tracker + 3), -inverse_turn_slope(-turns)),
+                (last, slice(tracker, tracker + 3), crosses(p)),
+                (last, slice(tracker + 3, tracker + 6), -np.eye(3)),
+                (first, slice(marker, marker + 3), slope @ R_WP),
+                (last, slice(marker + 3, marker + 6), R_WP),
+            ]
+
         return residual, B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.all(np.isfinite(self.p), axis=1) & np.all(np.isfinite(self.R), axis=(1, 2))
         return np.repeat(np.asarray(whole)[:, None], 6, axis=1)
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         return np.tile([self.sigma_turn] * 3 + [self.sigma_place] * 3, (len(self.p), 1))
 
     def values(self, at: Point) -> Array:
@@ -81,10 +82,6 @@ class TrackedPoses(Term):
         turns = turn_vectors(np.where(seen[:, :1, None], self.R, np.eye(3)))
         R_WK = at.model.X_WK.rotation().matrix()
         return np.hstack([turns @ R_WK.T, self.p @ R_WK.T])
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tracker, {('turn', 'place')[row // 3]} {'xyz'[row % 3]}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +132,7 @@ class TrackedPoints(Term):
     kind = "tracked positions"
     unit = "m"
     by_pose = ("points",)
+    row_names = ("tracker, place x", "tracker, place y", "tracker, place z")
 
     @cached_property
     def _whitening(self) -> Array:
@@ -142,8 +140,7 @@ class TrackedPoints(Term):
         n = self.normal
         return np.asarray(np.eye(3) + (self.sigma / self.sigma_along - 1.0) * np.outer(n, n))
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
+    def parts(self, at: Point) -> Parts:
         k, where, seen = len(self.points), at.layout.slices, self.measured()
         X_WK, X_PM, R_WP = at.model.X_WK, at.model.X_PM, at.stations.R
         R_WK = X_WK.rotation().matrix()
@@ -158,17 +155,19 @@ class TrackedPoints(Term):
         B[:, :, :3] = -crosses(lever)
         B[:, :, 3:POSE] = np.eye(3)
         W = self._whitening
-        tracker, marker = where["tracker"].start, where["marker"].start
-        slopes: Slopes = [
-            (EVERY_ROW, slice(tracker, tracker + 3), W @ crosses(p)),
-            (EVERY_ROW, slice(tracker + 3, tracker + 6), -W),
-            (EVERY_ROW, slice(marker + 3, marker + 6), W @ R_WP),
-            (EVERY_ROW, where["clock"].start, -v @ W.T),
-        ]
+
+        def slopes() -> Slopes:
+            tracker, marker = where["tracker"].start, where["marker"].start
+            return [
+                (EVERY_ROW, slice(tracker, tracker + 3), W @ crosses(p)),
+                (EVERY_ROW, slice(tracker + 3, tracker + 6), -W),
+                (EVERY_ROW, slice(marker + 3, marker + 6), W @ R_WP),
+                (EVERY_ROW, where["clock"].start, -v @ W.T),
+            ]
+
         return residual @ W.T, W @ B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.asarray(np.isfinite(self.points).all(axis=1))
         return np.repeat(whole[:, None], 3, axis=1)
 
@@ -177,12 +176,7 @@ class TrackedPoints(Term):
         R_WK = at.model.X_WK.rotation().matrix()
         return np.asarray(self.points @ R_WK.T @ self._whitening.T)
 
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return f"tracker, place {'xyz'[row]}"
-
     def only(self, which: npt.NDArray[np.generic] | slice) -> TrackedPoints:
-        """As the base class says."""
         course = None if self.course is None else self.course.only(which)
         return replace(super().only(which), course=course)
 
@@ -208,7 +202,7 @@ class TagCorners(Term):
     unit = "px"
     by_pose = ("uv",)
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says; infinite where a corner that was seen lies behind the camera."""
         k, count = self.uv.shape[:2]
         model, stations = at.model, at.stations
@@ -232,17 +226,21 @@ class TagCorners(Term):
         by_P = slope @ R_PC.T
         by_W = np.einsum("ktcij,kaj->ktcia", by_P, R_WP)
         rows, where, order = (k, 8 * count, 3), at.layout.slices, list(model.tags)
-        arms = crosses(np.moveaxis(c_W, 1, 2))  # (t, 4, 3, 3)
-        slopes: Slopes = []
-        for n, tag in enumerate(self.tags):
-            begin, mine = where["tags"].start + 6 * order.index(tag), slice(8 * n, 8 * n + 8)
-            by_turn = (by_W[:, n] @ -arms[n]).reshape(k, 8, 3)
-            slopes.append((mine, slice(begin, begin + 3), by_turn))
-            slopes.append((mine, slice(begin + 3, begin + 6), by_W[:, n].reshape(k, 8, 3)))
-        begin = where["camera"].start
-        s_x = crosses(np.moveaxis(s_P, 2, 3))
-        slopes.append((EVERY_ROW, slice(begin, begin + 3), (by_P @ s_x).reshape(rows)))
-        slopes.append((EVERY_ROW, slice(begin + 3, begin + 6), -by_P.reshape(rows)))
+
+        def slopes() -> Slopes:
+            camera, s_x = where["camera"].start, crosses(np.moveaxis(s_P, 2, 3))
+            arms = crosses(np.moveaxis(c_W, 1, 2))  # (t, 4, 3, 3)
+            parts: Slopes = [
+                (EVERY_ROW, slice(camera, camera + 3), (by_P @ s_x).reshape(rows)),
+                (EVERY_ROW, slice(camera + 3, camera + 6), -by_P.reshape(rows)),
+            ]
+            for n, tag in enumerate(self.tags):
+                begin, mine = where["tags"].start + 6 * order.index(tag), slice(8 * n, 8 * n + 8)
+                by_turn = (by_W[:, n] @ -arms[n]).reshape(k, 8, 3)
+                parts.append((mine, slice(begin, begin + 3), by_turn))
+                parts.append((mine, slice(begin + 3, begin + 6), by_W[:, n].reshape(k, 8, 3)))
+            return parts
+
         B, q_x = at.blank(8 * count), crosses(np.moveaxis(q_W, 2, 3))
         B[:, :, :3] = (by_W @ q_x).reshape(rows)
         B[:, :, 3:POSE] = -by_W.reshape(rows)
@@ -250,7 +248,6 @@ class TagCorners(Term):
         return residual.reshape(k, 8 * count), B, slopes
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         whole = np.asarray(np.all(np.isfinite(self.uv), axis=3))
         return np.repeat(whole.reshape(len(self.uv), -1), 2, axis=1)
 
@@ -259,7 +256,6 @@ class TagCorners(Term):
         return np.zeros(self.measured().shape)
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         corner, axis = divmod(row % 8, 2)
         return f"tag {self.tags[row // 8]}, corner {corner + 1}, {'uv'[axis]}"
 
@@ -285,8 +281,9 @@ class Tilts(Term):
     sigma_yaw: float
     kind = "inclination"
     unit = "rad"
+    row_names = ("roll", "pitch", "yaw")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says; infinite where the platform is pitched by a right angle."""
         R = at.stations.R
         level = np.hypot(R[:, 0, 0], R[:, 1, 0])  # cosine of the pitch
@@ -304,13 +301,10 @@ class Tilts(Term):
         slope = -R[:, 2, 0] / safe
         B[:, 2, 0], B[:, 2, 1], B[:, 2, 2] = slope * c, slope * s, 1.0
         three = np.arange(3)
-        slopes: Slopes = [(three, at.layout.slices["tilt_zeros"].start + three, -1.0)]
-        return np.where(upright[:, None], residual, np.inf), B, slopes
+        zeros = at.layout.slices["tilt_zeros"].start + three
+        return (
+            np.where(upright[:, None], residual, np.inf), B, lambda: [(three, zeros, -1.0)]
+        )  # fmt: skip
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         return np.tile([self.sigma_tilt, self.sigma_tilt, self.sigma_yaw], (len(self.readings), 1))
-
-    def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
-        return ("roll", "pitch", "yaw")[row]

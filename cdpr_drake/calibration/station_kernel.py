@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.geometry.poses import rotation_vector_of_matrix
 from cdpr_drake.geometry.pulley_kernel import LINEAR_WEIGHT, PULLEY_RADIUS, tangent
 
 SWIVEL = LINEAR_WEIGHT + 1
@@ -81,6 +82,13 @@ def cable_terms(
                 for b in range(3):
                     other = cosine * e[b] + sine * n[b]
                     hessians[k, i, a, b] = normal * other / L + bent * side[a] * side[b]
+
+
+@njit(cache=True, error_model="numpy")
+def rotation_vectors(R: Array, vectors: Array) -> None:
+    """Writes the rotation vectors of rotations, shape (k, 3, 3), shape (k, 3) [rad]."""
+    for k in range(len(R)):
+        vectors[k] = rotation_vector_of_matrix(R[k])
 
 
 @njit(cache=True, error_model="numpy")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +17,7 @@ from cdpr_drake.calibration.parameters import (
     moved_model,
     parameter_layout,
 )
-from cdpr_drake.calibration.station_kernel import cable_terms
-from cdpr_drake.geometry.poses import rotation_vector_of_matrix
+from cdpr_drake.calibration.station_kernel import cable_terms, rotation_vectors
 
 POSE = 6
 """Coordinates of a pose: turn about the axes of W [rad], then translation [m]."""
@@ -117,7 +117,11 @@ class Point:
 
     def only(self, which: npt.NDArray[np.generic] | slice) -> Point:
         """The model and some of the poses."""
-        return Point(self.model, self.stations.only(which), self.layout)
+        some = copy(self)
+        some.stations = self.stations.only(which)
+        for name in ("numbers", "vectors", "hessians"):
+            setattr(some, name, getattr(self, name)[which])
+        return some
 
     def moved(self, step: Array, steps: Array) -> Point:
         """After a step of all parameters, shape (n,), and of all stations, shape (k, width)."""
@@ -145,7 +149,9 @@ def turns_of_vectors(turns: Array) -> Array:
 
 def turn_vectors(R: Array) -> Array:
     """Rotation vectors of many rotations, shape (k, 3, 3) to (k, 3) [rad]."""
-    return np.array([rotation_vector_of_matrix(each) for each in R]).reshape(-1, 3)
+    vectors = np.empty((len(R), 3))
+    rotation_vectors(np.ascontiguousarray(R), vectors)
+    return vectors
 
 
 def inverse_turn_slope(turns: Array) -> Array:

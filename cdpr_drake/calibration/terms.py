@@ -8,7 +8,7 @@ sensors are in `sensor_terms`. A number that is NaN was not measured. Poses turn
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -36,6 +36,8 @@ Evaluated = tuple[Array, Array, Array]
 Slopes = list[tuple[Any, Any, Any]]
 """Rows and columns of derivatives by parameters, and the values there at each pose."""
 
+Parts = tuple[Array, Array, Callable[[], Slopes]]
+
 EVERY_ROW = slice(None)
 
 
@@ -46,6 +48,7 @@ class Term(ABC):
         kind: What they are.
         unit: Of a residual times its sigma; of two units the first is of the first three rows.
         by_pose: Fields that have a row for each pose.
+        row_names: What rows are, in words, unless `row_name` says it.
         readings: What was measured; terms without it say themselves what counts.
         sigma: Standard deviation, or one for each reading, in the unit.
     """
@@ -53,20 +56,21 @@ class Term(ABC):
     kind: str
     unit: str
     by_pose: ClassVar[tuple[str, ...]] = ("readings",)
+    row_names: ClassVar[tuple[str, ...]]
     readings: Array
     sigma: Any
 
     @abstractmethod
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """Residuals in the unit, shape (k, rows), and their derivatives by what is unknown of each
-        pose, shape (k, rows, width), and by parameters."""
+        pose, shape (k, rows, width), and, as a function, by parameters."""
 
     def evaluate(self, at: Point) -> Evaluated:
         """Residuals over their sigmas, shape (k, rows), zero where nothing was measured, and their
         derivatives by all parameters, (k, rows, n), and by each pose, (k, rows, width)."""
         residual, B, slopes = self.parts(at)
         A = np.zeros((*residual.shape, at.layout.size))
-        for rows, columns, values in slopes:
+        for rows, columns, values in slopes():
             A[:, rows, columns] = values
         weight = self.weights()
         return self._weighted(residual, weight), A * weight[:, :, None], B * weight[:, :, None]
@@ -92,9 +96,9 @@ class Term(ABC):
         """Standard deviations, shape (k, rows), in the unit."""
         return np.broadcast_to(self.sigma, self.measured().shape)
 
-    @abstractmethod
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
         """What a row is, in words; with the names of the cables."""
+        return self.row_names[row]
 
     def row_unit(self, row: int) -> str:
         """Unit of a row."""
@@ -125,7 +129,6 @@ class CableTerm(Term):
     word: str
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         return f"{self.word} of {names[row]}"
 
 
@@ -141,11 +144,17 @@ def _own(at: Point, group: str) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.in
     return i, at.layout.slices[group].start + i
 
 
+def _common(at: Point, group: str) -> tuple[npt.NDArray[np.intp], int]:
+    """Rows, one a cable, and the column of a number that all cables have in common."""
+    return np.arange(at.model.cables.count), at.layout.slices[group].start
+
+
 @dataclass(eq=False)
 class Lengths(CableTerm):
     """Cable lengths that winches counted, from a reading each where counting began.
 
-    A reading is model = start + (length / (1 + strain) - start - offset) / scale.
+    A reading is model = (start + (length / (1 + strain) - start - offset) / scale) / common scale;
+    the offset is the cable's own and the common one.
 
     Attributes:
         readings: Shape (k, m) [m].
@@ -163,28 +172,36 @@ class Lengths(CableTerm):
     word = "length"
     by_pose = ("readings", "sigma", "strain")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
-        scale, per_length = at.model.length_scale, 1.0 / (1.0 + self.strain)
-        counted = at.numbers[:, :, LENGTH] * per_length - self.start - at.model.length_offset
-        u, slope = at.vector(U), per_length / scale
-        u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), -u * slope[:, :, None]),
-            (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
-            (*_own(at, "length_offsets"), -1.0 / scale),
-            (*_own(at, "length_scales"), -counted / scale**2),
-            (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
-        ]
+    def parts(self, at: Point) -> Parts:
+        model, per_length = at.model, 1.0 / (1.0 + self.strain)
+        scale, common = model.length_scale, model.common_length_scale
+        offset = model.length_offset + model.common_length_offset
+        counted = at.numbers[:, :, LENGTH] * per_length - self.start - offset
+        whole = self.start + counted / scale
+        u, slope = at.vector(U), per_length / scale / common
+
+        def slopes() -> Slopes:
+            u_P = np.einsum("kba,kmb->kma", at.stations.R, u)
+            return [
+                (*_three(at, "exit_points"), -u * slope[:, :, None]),
+                (*_three(at, "anchor_points"), u_P * slope[:, :, None]),
+                (*_own(at, "length_offsets"), -1.0 / scale / common),
+                (*_own(at, "length_scales"), -counted / scale**2 / common),
+                (*_common(at, "common_length_offset"), -1.0 / scale / common),
+                (*_common(at, "common_length_scale"), -whole / common**2),
+                (*_own(at, "pulley_radii"), at.numbers[:, :, RADIUS_SLOPE] * slope),
+            ]
+
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
-        return self.start + counted / scale - self.readings, B, slopes
+        return whole / common - self.readings, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Lengths:
-        """As the base class says."""
         offsets = np.array([model.length_offset for model in models])
-        return replace(self, readings=self.readings + offsets / base.length_scale)
+        return replace(
+            self, readings=self.readings + offsets / base.length_scale / base.common_length_scale
+        )
 
 
 @dataclass(eq=False)
@@ -192,10 +209,10 @@ class ZeroedCables(Term):
     """What was paid out since winches stood at zero: cable lengths, or what motor angles say.
 
     Winches stood at zero at a pose that is known, where cables were as long as the model says
-    there, and by `length_offset` longer; without such a pose `length_offset` is the whole length
-    at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out. What a
-    motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square of the
-    radius at which line leaves falls in proportion to what is paid out, as in firmware of
+    there, and by `length_offset` and the common one longer; without such a pose these are the whole
+    length at zero. A residual is length / (1 + strain) - length there - offset - scale * paid out.
+    What a motor pays out follows its drum, see `winches.drum`: with one turn in a layer the square
+    of the radius at which line leaves falls in proportion to what is paid out, as in firmware of
     Hangprinters.
 
     Attributes:
@@ -235,32 +252,39 @@ class ZeroedCables(Term):
         drum = replace(self.drum, radius=self.drum.radius + grown)
         return drum.paid_out(self.readings), drum.per_radius(self.readings) / self.advantage
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
+    def parts(self, at: Point) -> Parts:
         model, slope = at.model, 1.0 / (1.0 + self.strain)
         paid, by_radius = self.paid_out(model)
-        scale, u = model.length_scale, at.vector(U)
-        residual = at.numbers[:, :, LENGTH] * slope - model.length_offset - scale * paid
+        common, u = model.common_length_scale, at.vector(U)
+        scale, offset = model.length_scale * common, model.length_offset
+        offset = offset + model.common_length_offset
+        residual = at.numbers[:, :, LENGTH] * slope - offset - scale * paid
         residual = residual - self.added
-        exits = -u * slope[:, :, None]
-        anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
-        radii = at.numbers[:, :, RADIUS_SLOPE] * slope
+        home = None
         if self.zero is not None:
             home = Point(model, Stations.at([self.zero]), at.layout)
-            v = home.vector(U)[0]
             residual = residual - home.numbers[0, :, LENGTH]
-            exits, anchors = exits + v, anchors - v @ home.stations.R[0]
-            radii = radii - home.numbers[0, :, RADIUS_SLOPE]
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), exits),
-            (*_three(at, "anchor_points"), anchors),
-            (*_own(at, "pulley_radii"), radii),
-            (*_own(at, "length_offsets"), -1.0),
-            (*_own(at, "length_scales"), -paid),
-            (*_own(at, "drum_radii"), -scale * by_radius),
-            (np.arange(len(scale)), at.layout.slices["common_drum_radius"].start,
-             -scale * by_radius),
-        ]  # fmt: skip
+
+        def slopes() -> Slopes:
+            exits = -u * slope[:, :, None]
+            anchors = np.einsum("kba,kmb->kma", at.stations.R, u) * slope[:, :, None]
+            radii = at.numbers[:, :, RADIUS_SLOPE] * slope
+            if home is not None:
+                v = home.vector(U)[0]
+                exits, anchors = exits + v, anchors - v @ home.stations.R[0]
+                radii = radii - home.numbers[0, :, RADIUS_SLOPE]
+            return [
+                (*_three(at, "exit_points"), exits),
+                (*_three(at, "anchor_points"), anchors),
+                (*_own(at, "pulley_radii"), radii),
+                (*_own(at, "length_offsets"), -1.0),
+                (*_own(at, "length_scales"), -paid * common),
+                (*_own(at, "drum_radii"), -scale * by_radius),
+                (*_common(at, "common_drum_radius"), -scale * by_radius),
+                (*_common(at, "common_length_offset"), -1.0),
+                (*_common(at, "common_length_scale"), -paid * model.length_scale),
+            ]
+
         B = at.blank(len(scale))
         B[:, :, :3] = np.cross(at.vector(ARM), u) * slope[:, :, None]
         B[:, :, 3:POSE] = u * slope[:, :, None]
@@ -268,16 +292,15 @@ class ZeroedCables(Term):
 
     def values(self, at: Point) -> Array:
         """As the base class says: cable that was paid out [m]."""
-        return at.model.length_scale * self.paid_out(at.model)[0]
+        scale = at.model.length_scale * at.model.common_length_scale
+        return scale * self.paid_out(at.model)[0]
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         return f"{'length' if self.drum is None else 'motor angle'} of {names[row]}"
 
     def counted_by(
         self, models: Sequence[CalibrationModel], base: CalibrationModel
     ) -> ZeroedCables:
-        """As the base class says."""
         offsets = np.array([model.length_offset for model in models])
         return replace(self, added=self.added + offsets)
 
@@ -297,22 +320,23 @@ class Swivels(CableTerm):
     unit = "rad"
     word = "swivel angle"
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
+    def parts(self, at: Point) -> Parts:
         residual = at.numbers[:, :, SWIVEL_ANGLE] - at.model.swivel_offset - self.readings
         residual = (residual + np.pi) % (2.0 * np.pi) - np.pi
         g = at.vector(ACROSS)
-        slopes: Slopes = [
-            (*_three(at, "exit_points"), -g),
-            (*_three(at, "anchor_points"), np.einsum("kba,kmb->kma", at.stations.R, g)),
-            (*_own(at, "swivel_offsets"), -1.0),
-        ]
+
+        def slopes() -> Slopes:
+            return [
+                (*_three(at, "exit_points"), -g),
+                (*_three(at, "anchor_points"), np.einsum("kba,kmb->kma", at.stations.R, g)),
+                (*_own(at, "swivel_offsets"), -1.0),
+            ]
+
         B = at.blank(g.shape[1])
         B[:, :, :3], B[:, :, 3:POSE] = np.cross(at.vector(ARM), g), g
         return residual, B, slopes
 
     def counted_by(self, models: Sequence[CalibrationModel], base: CalibrationModel) -> Swivels:
-        """As the base class says."""
         offsets = np.array([model.swivel_offset for model in models])
         return replace(self, readings=self.readings + offsets)
 
@@ -333,17 +357,16 @@ class Tensions(CableTerm):
     word = "tension"
     by_pose = ("readings", "sigma")
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
-        """As the base class says."""
+    def parts(self, at: Point) -> Parts:
         assert at.stations.tensions is not None
         m = self.readings.shape[1]
         B = at.blank(m)
         B[:, np.arange(m), POSE + np.arange(m)] = 1.0
-        return at.stations.tensions - self.readings, B, []
+        return at.stations.tensions - self.readings, B, list
 
 
 @dataclass(eq=False)
-class EquilibriumTerm(Term):
+class Rest(Term):
     """The platform rests: tensions and weight balance up to what is not modelled.
 
     Of a platform that moves less than a body in space they balance along the motions that it has:
@@ -367,7 +390,7 @@ class EquilibriumTerm(Term):
     kind = "equilibrium"
     unit = "N m, N"
 
-    def parts(self, at: Point) -> tuple[Array, Array, Slopes]:
+    def parts(self, at: Point) -> Parts:
         """As the base class says, of a body in space, in each of six rows."""
         t = at.stations.tensions
         assert t is not None
@@ -385,15 +408,19 @@ class EquilibriumTerm(Term):
         by_arm = by_point.copy()
         by_arm[:, :, :3] -= ux
         minus_t = -t[:, :, None, None]
-        exits = -minus_t * by_point
-        anchors = minus_t * (by_arm @ at.stations.R[:, None])
-        bend = at.vector(BEND)
-        bent = np.concatenate([np.cross(arm, bend), bend], axis=2) * -t[:, :, None]
-        slopes: Slopes = [
-            (EVERY_ROW, where["exit_points"], np.moveaxis(exits, 1, 2).reshape(-1, 6, 3 * m)),
-            (EVERY_ROW, where["anchor_points"], np.moveaxis(anchors, 1, 2).reshape(-1, 6, 3 * m)),
-            (EVERY_ROW, where["pulley_radii"], np.moveaxis(bent, 1, 2)),
-        ]
+
+        def slopes() -> Slopes:
+            exits = -minus_t * by_point
+            anchors = minus_t * (by_arm @ at.stations.R[:, None])
+            exits, anchors = (np.moveaxis(x, 1, 2).reshape(-1, 6, 3 * m) for x in (exits, anchors))
+            bend = at.vector(BEND)
+            bent = np.concatenate([np.cross(arm, bend), bend], axis=2) * -t[:, :, None]
+            return [
+                (EVERY_ROW, where["exit_points"], exits),
+                (EVERY_ROW, where["anchor_points"], anchors),
+                (EVERY_ROW, where["pulley_radii"], np.moveaxis(bent, 1, 2)),
+            ]
+
         B = at.blank(6)
         B[:, :, :3] = np.sum(minus_t * (by_arm @ -armx), axis=1)
         B[:, :3, :3] += crosses(f) @ crosses(lever)
@@ -417,7 +444,6 @@ class EquilibriumTerm(Term):
         return (bases @ r[:, :, None])[:, :, 0], bases @ A, bases @ B
 
     def by_poses(self, at: Point) -> tuple[Array, Array]:
-        """As the base class says."""
         r, B = super().by_poses(at)
         if self.motion is None:
             return r, B
@@ -431,7 +457,6 @@ class EquilibriumTerm(Term):
         return bases.reshape(-1, self.motion.freedom, 6)
 
     def measured(self) -> npt.NDArray[np.bool_]:
-        """As the base class says."""
         rows = 6 if self.motion is None else self.motion.freedom
         return np.ones((self.count, rows), dtype=bool)
 
@@ -440,25 +465,20 @@ class EquilibriumTerm(Term):
         return 3 if self.motion is None else self.motion.num_turns
 
     def sigmas(self) -> Array:
-        """As the base class says."""
         sigmas = np.full(self.measured().shape, self.sigma_force)
         sigmas[:, : self._turns()] = self.sigma_moment
         return sigmas
 
     def values(self, at: Point) -> Array:
-        """As the base class says."""
         return np.zeros(self.measured().shape)
 
     def row_name(self, row: int, names: tuple[str, ...]) -> str:
-        """As the base class says."""
         if self.motion is not None:
             return self.motion.words()[row]
         return f"{('moment', 'force')[row // 3]} along {'xyz'[row % 3]}"
 
     def row_unit(self, row: int) -> str:
-        """As the base class says."""
         return "N m" if row < self._turns() else "N"
 
-    def only(self, which: npt.NDArray[np.generic] | slice) -> EquilibriumTerm:
-        """As the base class says."""
+    def only(self, which: npt.NDArray[np.generic] | slice) -> Rest:
         return replace(self, count=len(np.arange(self.count)[which]))

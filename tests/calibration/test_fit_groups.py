@@ -6,9 +6,10 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from cdpr_drake.calibration.fit_groups import _Residuals, group_faults, runs_test
+from cdpr_drake.calibration.fit_groups import group_faults, runs_test
 from cdpr_drake.calibration.measurements import simulated_lengths, simulated_poses
 from cdpr_drake.calibration.program import CalibrationProgram
+from cdpr_drake.calibration.projected_residuals import ProjectedResiduals
 from cdpr_drake.calibration.stations import Point
 from tests.calibration.bench import poses, start_readings, true_model
 
@@ -36,7 +37,7 @@ def fitted(noise=1.0, seed=0, spoil=lambda readings: None, place=1.0, count=COUN
 
 def residuals_of(problem, result):
     at = Point(result.model, result.stations)
-    return _Residuals(problem, at, result.pose_std)
+    return ProjectedResiduals(problem, at, result.pose_std)
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -83,6 +84,34 @@ def test_a_drum_that_turned_once_cannot_be_told_from_where_counting_began():
         program.Solve()
     told = set(re.findall(r"C3's \w+ \w+", str(problem.value)))
     assert told >= {"C3's drum radius", "C3's length offset"}
+
+
+@pytest.mark.parametrize("zeroed", [False, True])
+def test_one_tape_that_starts_late_and_is_too_short_is_found(zeroed):
+    true = replace(true_model(), common_length_offset=0.03, common_length_scale=1.002)
+    random = np.random.default_rng(0)
+    at = poses(20, random)
+    zero = np.zeros(8) if zeroed else start_readings(true, at[0])
+    readings = simulated_lengths(true, at, zero, 1e-4, random)
+    tracked = simulated_poses(at, 1e-3, 1e-4, random)
+
+    def solved(unknown):
+        program = CalibrationProgram(true_model(), tracked, unknown)
+        if zeroed:
+            program.AddZeroedCables(readings, 1e-4, None)
+        else:
+            program.AddLengths(readings, 1e-4, zero)
+        program.AddTrackedPoses(tracked, 1e-3, 1e-4)
+        return program.Solve()
+
+    both = ["common_length_offset", "common_length_scale"]
+    result = solved(both)
+    errors = result.values - [0.03, 0.002]
+    assert errors @ np.linalg.solve(result.covariance, errors) < chi2.ppf(1.0 - SURE, 2)
+    assert np.max(result.std) < 1e-3
+    with pytest.raises(CalibrationError, match="offset of all lengths") as problem:
+        solved([*both, "length_offsets"])
+    assert " cannot be told from " in str(problem.value)
 
 
 def test_a_prior_tells_what_measurements_cannot():

@@ -20,15 +20,15 @@ EDGE = 4
 """Rows at the ends of a stop that a window cannot tell from motion."""
 
 
-def recorded(noise=NOISE, step=0.1, seed=0):
+def recorded(noise=NOISE, step=0.1, seed=0, rows_of_a_stop=STANDS):
     """Times, lengths and tensions of a drive between stops, with friction; rows that stand."""
     random = np.random.default_rng(seed)
     corners = random.uniform(1.0, 2.0, (STOPS + 1, 4))
     way = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, MOVES))
     rows, stands = [], []
     for here, there in pairwise(corners):
-        rows += [here] * STANDS + [here + s * (there - here) for s in way]
-        stands += [True] * STANDS + [False] * MOVES
+        rows += [here] * rows_of_a_stop + [here + s * (there - here) for s in way]
+        stands += [True] * rows_of_a_stop + [False] * MOVES
     lengths = np.array(rows)
     tensions = 50.0 + 10.0 * lengths + 4.0 * np.sign(np.gradient(lengths, axis=0))
     lengths = lengths + noise * random.standard_normal(lengths.shape)
@@ -55,6 +55,15 @@ def test_stops_of_a_drive_are_found_and_nothing_else(noise, step):
     for group in found.groups:
         outside[group] = False
     np.testing.assert_array_equal(outside, found.moving | found.unsteady)
+
+
+@pytest.mark.parametrize("noise", [1e-5, NOISE])
+def test_stops_no_longer_than_a_window_are_found(noise):
+    time, lengths, tensions, stands = recorded(noise, rows_of_a_stop=10)
+    found = rows_at_rest(time, [lengths], tensions)
+    assert len(found.groups) == STOPS
+    # The first and the last row of a way are where the platform stands.
+    assert all(np.sum(~stands[group]) <= 2 for group in found.groups)
 
 
 def test_means_are_those_of_the_rows():

@@ -41,6 +41,7 @@ def everything():
     true = replace(
         true, X_WK=X_WK, X_PM=X_PM, length_scale=random.uniform(0.6, 1.5, 8),
         length_offset=random.uniform(-0.1, 0.1, 8), swivel_offset=random.uniform(-0.2, 0.2, 8),
+        common_length_offset=0.03, common_length_scale=0.9,
     )  # fmt: skip
     program = CalibrationProgram(true, at, ["*"])
     start = start_readings(true, at[0])
@@ -72,7 +73,8 @@ def zeroed():
         X_PM=nearby(RigidTransform(), 0.5, 0.3, random),
         length_scale=random.uniform(0.8, 1.2, 8), length_offset=random.uniform(-0.1, 0.1, 8),
         drum_radius=random.uniform(-1e-3, 1e-3, 8), common_drum_radius=5e-4,
-        tilt_zero=random.uniform(-0.3, 0.3, 3), clock=0.02,
+        tilt_zero=random.uniform(-0.3, 0.3, 3), clock=0.02, common_length_offset=0.03,
+        common_length_scale=1.1,
     )  # fmt: skip
     program = CalibrationProgram(true, at, ["*"])
     strain = random.uniform(0.0, 0.01, (COUNT, 8))
@@ -163,8 +165,8 @@ def test_lengths_are_counted_from_the_start_by_drums_and_strain():
     at, term = everything().at(), everything().terms[0]
     model = at.model
     length = np.array([cable_paths(X, model.cables).lengths for X in at.stations.poses()])
-    paid = length / (1.0 + term.strain) - term.start - model.length_offset
-    expected = term.start + paid / model.length_scale - term.readings
+    paid = length / (1.0 + term.strain) - term.start - model.length_offset - 0.03
+    expected = (term.start + paid / model.length_scale) / 0.9 - term.readings
     np.testing.assert_allclose(told(term, at), expected, atol=SAME)
     np.testing.assert_array_equal(term.sigmas(), np.full((3, 8), 1e-3))
 
@@ -282,7 +284,8 @@ def test_motor_angles_are_those_of_the_drum_from_where_it_stood_at_zero():
     radius = SPIRAL.radius + model.drum_radius + model.common_drum_radius
     drum = replace(SPIRAL, radius=radius)
     lengths = at.numbers[:, :, 0] / (1.0 + term.strain)
-    angles = drum.motor_angles((lengths - home - model.length_offset) / model.length_scale)
+    paid = (lengths - home - model.length_offset - 0.03) / (1.1 * model.length_scale)
+    angles = drum.motor_angles(paid)
     fits = replace(term, readings=angles)
     np.testing.assert_allclose(fits.evaluate(at)[0] * fits.sigmas(), 0.0, atol=SAME)
 

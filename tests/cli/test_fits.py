@@ -158,12 +158,12 @@ def test_a_tracker_out_of_sync_is_named_and_can_be_put_right(here, capsys):
 
 def test_what_a_robot_file_cannot_hold_is_said():
     class Result:
-        model = replace(TRUE, length_scale=np.linspace(1.0, 1.02, 8))
-        names = ("C1.length_offset", "C1.length_scale")
+        model = replace(TRUE, common_length_scale=1.01)
+        names = ("C1.length_offset", "C1.length_scale", "common_length_scale")
         status = "converged"
 
     robot, left = calibrated_robot(ROBOT, Result())
-    assert len(left) == 2
+    assert len(left) == 3
     assert robot.winch.drum_radius == pytest.approx(1.01 * ROBOT.winch.drum_radius)
 
 

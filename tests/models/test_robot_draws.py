@@ -73,7 +73,8 @@ def test_changes_have_the_size_that_they_say():
         {
             "mass": 0.1, "center_of_mass.z": 0.01, "inertia.xy": 1e-5, f"{name}.stiffness": 1e3,
             "all.stiffness": 500.0, f"{name}.exit_point.z": 0.02, f"{name}.pulley_radius": 1e-3,
-            f"{name}.length_scale": 0.1, "common_drum_radius": 1e-3,
+            f"{name}.length_scale": 0.1, "common_drum_radius": 1e-3, "common_length_scale": 0.01,
+            "common_length_offset": 0.03,
         },
     )  # fmt: skip
     assert changed.platform.mass == ROBOT.platform.mass + 0.1
@@ -83,8 +84,8 @@ def test_changes_have_the_size_that_they_say():
     assert changed.exit_points()[2, 0] - ROBOT.exit_points()[2, 0] == pytest.approx(0.02)
     assert changed.cable_set().pulley_radius[0] == pytest.approx(ROBOT.pulley.radius + 1e-3)
     radius = ROBOT.winch.drum_radius
-    assert changed.cables[0].drum_radius == pytest.approx(1.1 * radius + 1e-3)
-    assert changed.cables[1].drum_radius == pytest.approx(radius + 1e-3)
+    assert changed.cables[0].drum_radius == pytest.approx(1.1 * 1.01 * radius + 1e-3)
+    assert changed.cables[1].drum_radius == pytest.approx(1.01 * radius + 1e-3)
 
 
 def test_friction_of_winches_changes_the_one_law_by_their_mean():

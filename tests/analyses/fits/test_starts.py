@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
+from scipy.spatial.distance import pdist
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.fits import calibration
@@ -16,6 +17,7 @@ from cdpr_drake.analyses.fits.setup import HOMING, Sigmas, default_unknown
 from cdpr_drake.analyses.fits.starts import upright_minima, upside_down
 from cdpr_drake.analyses.fits.verdict import impossible_poses
 from cdpr_drake.analyses.logs.measurements import Measurements
+from cdpr_drake.calibration.guesses import unfolded_points
 from cdpr_drake.calibration.stations import Stations
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
@@ -109,6 +111,45 @@ def test_an_inclinometer_holds_what_lengths_leave_open():
     assert fit.remarks[0] == (
         "not used: C1_torque_nm, C2_torque_nm: a calibration has no use of motor torques"
     )
+
+
+# Lengths alone, of a point mass.
+
+ANCHORS = np.array([[0.0, 2.07], [1.45, 2.07], [0.0, 0.0], [1.445, 0.0]])
+"""Of a frame for which others are guessed [m]."""
+
+
+def test_points_unfold_from_lengths_in_space():
+    random = np.random.default_rng(0)
+    anchors, places = random.uniform(-1, 1, (5, 3)), random.uniform(-1, 1, (20, 3))
+    lengths = np.linalg.norm(places[:, None] - anchors, axis=2)
+    found, there = unfolded_points(lengths, 3)
+    np.testing.assert_allclose(np.linalg.norm(there[:, None] - found, axis=2), lengths, atol=1e-9)
+    np.testing.assert_allclose(pdist(found), pdist(anchors), atol=1e-9)
+    assert unfolded_points(lengths[:9], 3) is None
+    assert unfolded_points(lengths[:, :3], 3) is None
+    assert unfolded_points(np.ones((20, 5)), 3) is None
+
+
+def test_lengths_alone_tell_anchors_whatever_the_size_of_the_frame(tmp_path):
+    x, y = np.linspace(0.05, 1.395, 9), np.linspace(0.3, 1.77, 9)  # near anchors minima are many
+    places = np.stack(np.meshgrid(x, y), axis=2).reshape(-1, 1, 2)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((81, 4))
+    lengths = 1e3 * (np.linalg.norm(places - ANCHORS, axis=2) + noise)
+    rows = [",".join(f"{c}_length_mm" for c in ("tl", "tr", "bl", "br"))]
+    (tmp_path / "log.csv").write_text("\n".join(rows + [",".join(map(str, r)) for r in lengths]))
+    apart = []
+    for width, height in ((1500, 2000), (300, 300), (30000, 30000)):
+        corners = {"tl": (0, height), "tr": (width, height), "bl": (0, 0), "br": (width, 0)}
+        lines = [f"    {c}X: {x}\n    {c}Y: {y}\n    {c}Z: 0" for c, (x, y) in corners.items()]
+        robot = tmp_path / f"{width}.yaml"
+        head = "Maslow_vertical: true\nkinematics:\n  MaslowKinematics:\n"
+        robot.write_text(head + "\n".join(lines) + "\n")
+        fit = cdpr.calibrate(str(robot), str(tmp_path / "log.csv"))
+        assert fit.status == "converged"
+        apart.append(pdist(fit.model.exit_points().T))
+    np.testing.assert_allclose(apart[1:], [apart[0]] * 2, atol=1e-5)
+    np.testing.assert_allclose(apart[0], pdist(ANCHORS), atol=0.01)
 
 
 # A robot with fewer cables than degrees of freedom.
@@ -221,7 +262,8 @@ UP = np.array([0.0, 0.0, 1.0])
 def turned(*angles, **more):
     """A result with poses of these roll, pitch and yaw."""
     poses = [pose_from_angles(np.zeros(3), np.array(turn)) for turn in angles]
-    return SimpleNamespace(stations=Stations.at(poses), **more)
+    model = calibration_model(three_cables())
+    return SimpleNamespace(model=model, stations=Stations.at(poses), **more)
 
 
 def test_poses_upside_down_are_distinguished_from_upright_ones():

@@ -34,7 +34,8 @@ MOST_SIGMAS = 5.0
 
 def errors(result, true, *groups):
     """By how many standard deviations parameters of these groups are off."""
-    free = [any(group in name for group in groups) for name in parameter_layout(true).names]
+    names = parameter_layout(true).names
+    free = [any(group in name.split(".") for group in groups) for name in names]
     return np.abs(model_difference(result.model, true)[free]) / result.std
 
 
