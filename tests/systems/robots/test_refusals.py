@@ -292,7 +292,7 @@ GEOMETRY = {
 }  # fmt: skip
 
 PUSHES = {
-    "force: found no force and no moment; accepted: a force, a moment, or both, with step": Push(kind="step"),
+    r"force: found no force and no moment; accepted: a force, a moment, or both": Push(kind="step"),
     "end: found none; accepted: one, with push": Push(kind="push", force=ONES),
     "frequency: found none": Push(kind="sine", force=ONES),
     "mass: found none": Push(kind="payload"),
