@@ -163,7 +163,7 @@ def test_modules_that_declare_settings_have_no_postponed_annotations():
 READERS = {
     "yaml.load": {"cdpr_drake.schema.yaml_files"},
     "yaml_load_typed": set(),  # Drake's does not see through Annotated
-    "LoadIrisRegionsYamlFile": {"cdpr_drake.workspaces.proven_sets"},  # what Drake wrote for it
+    "LoadIrisRegionsYamlFile": {"cdpr_drake.proofs.proven_sets"},  # what Drake wrote for it
     "json.loads": {"cdpr_drake.schema.json_text"},
     "AddModels": {"cdpr_drake.models.drake_parsing"},
 }

@@ -50,10 +50,10 @@ from cdpr_drake.planning.reconfiguration import (
     tension_margins,
 )
 from cdpr_drake.planning.resistance import wrench_words
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE
+from cdpr_drake.proofs.box_judges import CertifiedKind, CertifyTask
+from cdpr_drake.proofs.certified_boxes import PoseBox, certify
 from cdpr_drake.schema.typed_yaml import dump_typed
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
-from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
-from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.static_feasibility import StaticCase, wrench_matrices
 

@@ -15,14 +15,14 @@ from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.planning.plans import Plan
 from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.path_in_sets import ProvenMotion
 from cdpr_drake.planning.path_timing import PathPlan
-from cdpr_drake.planning.timed_motion import MotionInTime
+from cdpr_drake.proofs.moving_clearances import moving_clearances
+from cdpr_drake.proofs.path_in_sets import ProvenMotion
+from cdpr_drake.proofs.proven_sets import PoseSets
+from cdpr_drake.proofs.timed_motion import MotionInTime
+from cdpr_drake.proofs.timed_sets import TimedSets
 from cdpr_drake.workspaces.cable_interference import Surroundings
-from cdpr_drake.workspaces.moving_clearances import moving_clearances
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
-from cdpr_drake.workspaces.proven_sets import PoseSets
-from cdpr_drake.workspaces.timed_sets import TimedSets
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -53,13 +53,13 @@ from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
-from cdpr_drake.planning.path_in_sets import METHODS, proven_motion
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS
-from cdpr_drake.planning.timed_motion import motion_in_time, straight_time
+from cdpr_drake.proofs.path_in_sets import METHODS, proven_motion
+from cdpr_drake.proofs.timed_motion import motion_in_time, straight_time
+from cdpr_drake.proofs.timed_sets import TimedSets
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
-from cdpr_drake.workspaces.timed_sets import TimedSets
 
 ACCELERATION = 0.25
 """Half width of the box of accelerations that is proven by default if nothing turns [m/s^2]."""

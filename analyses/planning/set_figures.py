@@ -21,8 +21,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.palette import BOUND, DESIRED, OUTLINE, PLATFORM, SHADED, TARGET
-from cdpr_drake.planning.box_timing import inertial_terms, mass_of
-from cdpr_drake.workspaces.moving_clearances import moving_clearances
+from cdpr_drake.proofs.box_timing import inertial_terms, mass_of
+from cdpr_drake.proofs.moving_clearances import moving_clearances
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.planning.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan

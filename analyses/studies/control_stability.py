@@ -63,7 +63,7 @@ from cdpr_drake.analyses.studies.stability_tables import (
 )
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.stability.no_stable_target import stable_target_exists
+from cdpr_drake.proofs.no_stable_target import stable_target_exists
 from cdpr_drake.stability.perturbation_bounds import DIRECTIONS, PerturbationBounds
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import VolumeRule, cell_hull_share, workspace_volume

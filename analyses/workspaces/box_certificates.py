@@ -19,11 +19,11 @@ from cdpr_drake.analyses.workspaces.pose_grid import plain
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.workspaces.box_expansion_kernel import OPEN
-from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement
-from cdpr_drake.workspaces.box_judges import MEETING, CertifiedKind, CertifyTask
-from cdpr_drake.workspaces.box_refinement import PathTube, refine
-from cdpr_drake.workspaces.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
+from cdpr_drake.proofs.box_expansion_kernel import OPEN
+from cdpr_drake.proofs.box_grid_agreement import BoxAgreement
+from cdpr_drake.proofs.box_judges import MEETING, CertifiedKind, CertifyTask
+from cdpr_drake.proofs.box_refinement import PathTube, refine
+from cdpr_drake.proofs.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.mesh_files import write_cells
 
@@ -112,7 +112,7 @@ def certified_boxes(
     """Boxes proven inside or outside; with a folder it goes on where it was stopped or killed.
 
     At most so many boxes are judged; more of them continue a search for fewer. `how` has
-    `on_progress` and `should_stop` of `workspaces.certify`.
+    `on_progress` and `should_stop` of `proofs.certify`.
 
     Raises:
         WorkspaceError: most_boxes < 1.

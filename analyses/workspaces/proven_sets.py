@@ -22,16 +22,16 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.proofs.proven_cells import CELLS, ProvenCells, prove_cells
+from cdpr_drake.proofs.proven_connection import connect_poses, inside_cell
+from cdpr_drake.proofs.proven_sets import COVER, PoseSets, sets_of_cells
+from cdpr_drake.proofs.timed_cells import PoseRaster, clear_cells
+from cdpr_drake.proofs.timed_sets import TimedSets, sets_in_time
 from cdpr_drake.workspaces.cable_interference import PART_NAMES, Obstacles, clearances
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet, resisting, spatial_inertias
 from cdpr_drake.workspaces.inertial_wrenches import moment_box, turning_wrenches
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
-from cdpr_drake.workspaces.proven_cells import CELLS, ProvenCells, prove_cells
-from cdpr_drake.workspaces.proven_connection import connect_poses, inside_cell
-from cdpr_drake.workspaces.proven_sets import COVER, PoseSets, sets_of_cells
-from cdpr_drake.workspaces.timed_cells import PoseRaster, clear_cells
-from cdpr_drake.workspaces.timed_sets import TimedSets, sets_in_time
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins
 
 BOXES = 100_000

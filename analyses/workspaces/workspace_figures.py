@@ -26,9 +26,9 @@ from cdpr_drake.analyses.workspaces.plane_panels import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
-from cdpr_drake.workspaces import box_expansion_kernel
+from cdpr_drake.proofs import box_expansion_kernel
+from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.workspaces.workspace_result import Workspace

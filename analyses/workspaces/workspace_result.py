@@ -45,8 +45,8 @@ from cdpr_drake.analyses.workspaces.workspace_hulls import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.workspaces.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+from cdpr_drake.proofs.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
+from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 

@@ -22,9 +22,9 @@ from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import WORKSPACES, Look, rgb
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
+from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.tensions.methods import exact_tensions
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.volume import surface_quads, triangles
 

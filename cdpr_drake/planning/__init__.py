@@ -5,10 +5,6 @@ x = (ds/dt)^2, with the redundancy as free variables; limits of tensions, torque
 accelerations make a convex set of (u, x) at every point of the path. Poses are X_WP; derivatives of
 a path are spatial vectors (rotation, translation) in W, per metre of s.
 
-A proven path (`proven_path`) goes through convex sets of poses that are proven: `set_sequences`
-chooses them, `set_curve` draws a curve with its control points in them, `box_timing` times it
-within a box of accelerations at every instant.
-
 Source: Bobrow, Dubowsky and Gibson, 1985; Pham and Stasse, 2015; Pham and Pham, 2018; Verscheure et
 al., Time-optimal path tracking for robots: a convex optimization approach, 2009, in tests.
 """

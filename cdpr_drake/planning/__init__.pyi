@@ -1,7 +1,5 @@
 from .free_path import FreePathProgram as FreePathProgram
 from .input_shaping import make_shaper as make_shaper
-from .path_in_sets import proven_motion as proven_motion
-from .path_in_sets import proven_path as proven_path
 from .path_task import sample_motion as sample_motion
 from .path_timing import plan_along_path as plan_along_path
 from .path_timing_program import PathTimingProgram as PathTimingProgram
@@ -22,4 +20,3 @@ from .tension_constraints import LengthAccelerations as LengthAccelerations
 from .tension_constraints import LengthRates as LengthRates
 from .tension_constraints import TensionBalance as TensionBalance
 from .tension_constraints import TensionFeasible as TensionFeasible
-from .timed_motion import motion_in_time as motion_in_time

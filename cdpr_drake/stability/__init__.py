@@ -13,11 +13,11 @@ positive definite.
   `criterion_kernel` and its like are those kernels, with the gradient, and
   `criterion_closed_forms` has the cases in which the robot's model is exact.
 * **Verdicts on poses**, of growing weight: sampled, searched, certified, by `judge_stability`. The
-  proof behind the last one stands in `quadratic_bounds_kernel`.
+  proof behind the last one stands in the room `proofs`.
 
 Source: servoing thesis chapter 3: (3.1), (3.8), (3.26) and 3.4 for the criterion, with e in the
 lever of PBVS as its analysis has it, or the exact matrix, see `OBJECT_POSE_MODELS`; 3.2 and
-tables A.8 to A.18 for perturbations; 3.3 for sampling. The certificate is this project's own.
+tables A.8 to A.18 for perturbations; 3.3 for sampling.
 """
 
 import lazy_loader

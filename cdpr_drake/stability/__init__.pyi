@@ -1,10 +1,8 @@
 from .criterion_at_pose_kernel import evaluate as evaluate
 from .desired_view import FixedObject as FixedObject
 from .desired_view import OppositeCorner as OppositeCorner
-from .no_stable_target import stable_target_exists as stable_target_exists
 from .perturbation_bounds import BASELINE as BASELINE
 from .perturbation_samples_kernel import mixed as mixed
-from .quadratic_bounds_kernel import Blocks as Blocks
 from .stability_case import IBVS as IBVS
 from .stability_case import PBVS as PBVS
 from .stability_case import SCHEMES as SCHEMES

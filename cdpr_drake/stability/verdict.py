@@ -8,6 +8,7 @@ sampled, and the margins are ordered likewise.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import import_module
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import StabilityError, accepted_names
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.stability.certified_kernel import MOST_CABLES, certified_margins
 from cdpr_drake.stability.criterion_at_pose_kernel import CaseArrays, PoseRows
 from cdpr_drake.stability.desired_view import TargetRows
 from cdpr_drake.stability.perturbation_bounds import PerturbationBounds, vector_size
@@ -31,6 +31,9 @@ from cdpr_drake.stability.stability_case import (
 
 VERDICTS = ("sampled", "searched", "certified")
 """Verdicts by growing weight."""
+
+PROOFS = "cdpr_drake.proofs.certified_kernel"
+"""What the verdict `certified` is proven by; the wing of proofs hangs on here, by name."""
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,9 @@ def _judged(
         )  # fmt: skip
     if certify:
         over_rows(
-            certified_margins, count, threads, arrays, rows, margins["searched"], found_at,
-            options.rounds, options.pieces, first_only, margins["certified"],
+            import_module(PROOFS).certified_margins, count, threads, arrays, rows,
+            margins["searched"], found_at, options.rounds, options.pieces, first_only,
+            margins["certified"],
         )  # fmt: skip
     return {
         verdict: StabilityChunk(margins[verdict] > 0.0, margins[verdict]) for verdict in verdicts
@@ -177,9 +181,10 @@ def refuse_unproven(case: StabilityCase, bounds: PerturbationBounds) -> None:
         raise StabilityError(
             f"perturbed: found {case.perturbed} for a certificate; accepted: estimate"
         )
-    if case.m > MOST_CABLES:
+    most = import_module(PROOFS).MOST_CABLES
+    if case.m > most:
         raise StabilityError(
-            f"cables: found {case.m} taut for a certificate; accepted: at most {MOST_CABLES}"
+            f"cables: found {case.m} taut for a certificate; accepted: at most {most}"
         )
     if bounds.d_theta_s > 0.0:
         raise StabilityError(

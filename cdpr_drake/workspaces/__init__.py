@@ -22,12 +22,7 @@ depends on them.
 shapes; a cable is a segment with a radius. Next to its ends a cable touches what carries it, so a
 length there is left out by name.
 
-**Proven sets**: `proven_cells`, `cuboid_cover` and `proven_sets` merge boxes to few convex sets
-whose overlaps are a graph; `proven_connection` cuts open cells where two poses need them.
-
-**Proofs for whole boxes of poses**: `certify` of `certified_boxes`, of one kind or several at once,
-and `refine` of `box_refinement` where more is needed; the proofs stand in `box_verdicts_kernel` and
-`box_collision_kernel`.
+What holds at every pose of a box or cell is proven in the room `proofs`.
 
 Source: Gazebo thesis 2.5 and 2.6; servoing thesis 1.2.2, (1.25), 1.2.4 and 1.3.3; Bosscher, Riechel
 and Ebert-Uphoff, Wrench-feasible workspace generation for cable-driven robots, 2006; Pham et al.,

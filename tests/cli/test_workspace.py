@@ -8,8 +8,8 @@ import yaml
 
 from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.workspaces import box_judges
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE
+from cdpr_drake.proofs import box_judges
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE
 from tests.cli.commands import answer, run, told
 from tests.cli.conftest import only
 from tests.motion.small_robots import content

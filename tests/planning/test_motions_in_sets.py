@@ -13,19 +13,19 @@ from cdpr_drake.geometry.poses import (
     pose_from_row,
     rotation_from_angles,
 )
-from cdpr_drake.planning.box_timing import inertial_terms, mass_of, time_within_box
-from cdpr_drake.planning.path_in_sets import proven_motion, proven_path
-from cdpr_drake.planning.set_curve import control_points
-from cdpr_drake.planning.set_sequences import OverlapGraph, least_ways
-from cdpr_drake.planning.timed_curve import RateLimits, TimedBoxes, keeps, timed_curve
-from cdpr_drake.planning.timed_motion import hop_times, motion_in_time, straight_time
-from cdpr_drake.planning.timed_sequences import TimedGraph
-from cdpr_drake.planning.turning_bounds import turning_bounds
+from cdpr_drake.proofs.box_timing import inertial_terms, mass_of, time_within_box
+from cdpr_drake.proofs.path_in_sets import proven_motion, proven_path
+from cdpr_drake.proofs.proven_sets import PoseSets
+from cdpr_drake.proofs.set_curve import control_points
+from cdpr_drake.proofs.set_sequences import OverlapGraph, least_ways
+from cdpr_drake.proofs.timed_curve import RateLimits, TimedBoxes, keeps, timed_curve
+from cdpr_drake.proofs.timed_motion import hop_times, motion_in_time, straight_time
+from cdpr_drake.proofs.timed_sequences import TimedGraph
+from cdpr_drake.proofs.timed_sets import TimedSets
+from cdpr_drake.proofs.turning_bounds import turning_bounds
 from cdpr_drake.trajectories.pose_path import smooth_path
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.inertial_wrenches import moment_box, turning_wrenches
-from cdpr_drake.workspaces.proven_sets import PoseSets
-from cdpr_drake.workspaces.timed_sets import TimedSets
 from tests.planning.planning_cases import SETS_BOX as BOX
 from tests.planning.planning_cases import plain_acrobot, sampled, wrench_of
 

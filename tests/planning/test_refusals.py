@@ -10,12 +10,10 @@ from pydrake.solvers import MathematicalProgram
 from cdpr_drake.analyses.planning.robot_path_task import make_path
 from cdpr_drake.errors import CdprError, PlanningError, WrenchSetError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.planning.box_timing import time_within_box
 from cdpr_drake.planning.failures import check_held
 from cdpr_drake.planning.free_path import FreePathProgram
 from cdpr_drake.planning.input_shaping import make_shaper
 from cdpr_drake.planning.limits import MotionLimits
-from cdpr_drake.planning.path_in_sets import proven_motion, proven_path
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.planning.path_timing_program import PathTimingProgram
@@ -30,11 +28,13 @@ from cdpr_drake.planning.pose_coordinates import BodyState, PlaceAndAngles
 from cdpr_drake.planning.reconfiguration import Rails, RailTask
 from cdpr_drake.planning.servo_constraint import StableServo
 from cdpr_drake.planning.tension_constraints import LengthRates
-from cdpr_drake.planning.timed_motion import motion_in_time
+from cdpr_drake.proofs.box_timing import time_within_box
+from cdpr_drake.proofs.path_in_sets import proven_motion, proven_path
+from cdpr_drake.proofs.proven_sets import PoseSets
+from cdpr_drake.proofs.timed_motion import motion_in_time
 from cdpr_drake.stability.perturbation_bounds import BASELINE
 from cdpr_drake.trajectories.pose_path import smooth_path
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
-from cdpr_drake.workspaces.proven_sets import PoseSets
 from tests.planning.planning_cases import (
     MARK,
     PATHS,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from cdpr_drake.stability.linear_forms_kernel import cable_remainder
+from cdpr_drake.proofs.linear_forms_kernel import cable_remainder
 
 # Cable by cable: in the whole criterion sums over cables hide terms of third order.
 

@@ -6,20 +6,15 @@ import numpy as np
 import pytest
 
 from cdpr_drake.geometry.poses import rotation_from_vector
-from cdpr_drake.stability.bound_ascent_kernel import bound_blocks
-from cdpr_drake.stability.certified_kernel import (
+from cdpr_drake.proofs.bound_ascent_kernel import bound_blocks
+from cdpr_drake.proofs.certified_kernel import (
     ROUNDING,
     certified_margins,
     prove,
     rounding_error,
 )
-from cdpr_drake.stability.criterion_at_pose_kernel import evaluate, new_work, prepare
-from cdpr_drake.stability.criterion_gradient_kernel import gradient, steepest_into
-from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
-from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
-from cdpr_drake.stability.quadratic_bounds_kernel import BALL_SIZES, BALLS, fill_blocks, new_blocks
-from cdpr_drake.stability.searched_kernel import searched_margins
-from cdpr_drake.stability.subdivision_kernel import (
+from cdpr_drake.proofs.quadratic_bounds_kernel import BALL_SIZES, BALLS, fill_blocks, new_blocks
+from cdpr_drake.proofs.subdivision_kernel import (
     BOXES,
     best_cut,
     new_piece,
@@ -29,6 +24,11 @@ from cdpr_drake.stability.subdivision_kernel import (
     whole_piece,
     worst_axes,
 )
+from cdpr_drake.stability.criterion_at_pose_kernel import evaluate, new_work, prepare
+from cdpr_drake.stability.criterion_gradient_kernel import gradient, steepest_into
+from cdpr_drake.stability.perturbation_bounds import BASELINE, PerturbationBounds
+from cdpr_drake.stability.perturbation_samples_kernel import draw_perturbations
+from cdpr_drake.stability.searched_kernel import searched_margins
 from cdpr_drake.stability.verdict import (
     VerdictOptions,
     judge_stability,

@@ -14,12 +14,12 @@ from cdpr_drake.errors import CdprError, StabilityError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows
 from cdpr_drake.geometry.rotation_kernel import rotations_of_quaternions
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.proofs import no_stable_target as any_target
+from cdpr_drake.proofs.no_stable_target import stable_target_exists
 from cdpr_drake.servoing.turned_view import encoder_turn
-from cdpr_drake.stability import no_stable_target as any_target
 from cdpr_drake.stability.criterion import stability_margin
 from cdpr_drake.stability.criterion_at_pose_kernel import evaluate, new_work, prepare
 from cdpr_drake.stability.desired_view import FixedError, FixedObject
-from cdpr_drake.stability.no_stable_target import stable_target_exists
 from cdpr_drake.stability.perturbation_bounds import (
     BASELINE,
     DIRECTIONS,

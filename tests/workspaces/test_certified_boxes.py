@@ -17,12 +17,12 @@ from cdpr_drake.analyses.workspaces.box_certificates import (
 from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.convex_shapes import ConvexShape
-from cdpr_drake.workspaces import box_judges
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask, judge_all
-from cdpr_drake.workspaces.box_refinement import PathTube, refine
+from cdpr_drake.proofs import box_judges
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_judges import CertifiedKind, CertifyTask, judge_all
+from cdpr_drake.proofs.box_refinement import PathTube, refine
+from cdpr_drake.proofs.certified_boxes import BoxJournal, certify
 from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, box_row, clearances
-from cdpr_drake.workspaces.certified_boxes import BoxJournal, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from tests.workspaces.workspace_cases import (
     DrakeScene,

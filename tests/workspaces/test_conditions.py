@@ -15,8 +15,8 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_copies import gravity_turn, turned_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.proofs.box_expansion_kernel import expand_demand
 from cdpr_drake.statics.stiffness import natural_modes, platform_stiffness
-from cdpr_drake.workspaces.box_expansion_kernel import expand_demand
 from cdpr_drake.workspaces.demanded_wrenches import (
     MotionDemand,
     SpatialSet,

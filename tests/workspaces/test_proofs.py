@@ -11,8 +11,7 @@ from cdpr_drake.geometry.convex_distance_kernel import convex_work
 from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.geometry.pulley_kernel import pulley_geometry
-from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
-from cdpr_drake.workspaces import (
+from cdpr_drake.proofs import (
     box_clearance_kernel,
     box_collision_kernel,
     box_expansion_kernel,
@@ -21,7 +20,7 @@ from cdpr_drake.workspaces import (
     box_pair_clearance_kernel,
     box_pulleys_kernel,
 )
-from cdpr_drake.workspaces.box_expansion_kernel import (
+from cdpr_drake.proofs.box_expansion_kernel import (
     ANCHOR,
     BEND,
     EXIT,
@@ -30,8 +29,9 @@ from cdpr_drake.workspaces.box_expansion_kernel import (
     OPEN,
     turn_axes,
 )
-from cdpr_drake.workspaces.box_judges import CLOSURE_SHARE
-from cdpr_drake.workspaces.box_pulleys_kernel import straight_points
+from cdpr_drake.proofs.box_judges import CLOSURE_SHARE
+from cdpr_drake.proofs.box_pulleys_kernel import straight_points
+from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
 from cdpr_drake.workspaces.cable_distance_kernel import segment_box_distance, segments_distance
 from cdpr_drake.workspaces.cable_interference import box_row
 from cdpr_drake.workspaces.wrench_capacity import capacity_margins, closure_margins

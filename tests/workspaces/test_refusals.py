@@ -16,17 +16,17 @@ from cdpr_drake.errors import (
     WrenchSetError,
 )
 from cdpr_drake.geometry.cable_set import CableSet
+from cdpr_drake.proofs.box_judges import CertifiedKind, CertifyTask
+from cdpr_drake.proofs.box_refinement import PathTube, refine
+from cdpr_drake.proofs.certified_boxes import PoseBox, certify
+from cdpr_drake.proofs.cuboid_cover import cover_cells
+from cdpr_drake.proofs.proven_sets import PoseSets
 from cdpr_drake.workspaces.available_wrenches import available_wrenches
-from cdpr_drake.workspaces.box_judges import CertifiedKind, CertifyTask
-from cdpr_drake.workspaces.box_refinement import PathTube, refine
 from cdpr_drake.workspaces.cable_interference import Surroundings, box_row
-from cdpr_drake.workspaces.certified_boxes import PoseBox, certify
-from cdpr_drake.workspaces.cuboid_cover import cover_cells
 from cdpr_drake.workspaces.demanded_wrenches import MotionDemand, SpatialSet
 from cdpr_drake.workspaces.hull import workspace_hull
 from cdpr_drake.workspaces.mesh_files import write_hull
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count, grid_by_step
-from cdpr_drake.workspaces.proven_sets import PoseSets
 from cdpr_drake.workspaces.single_failure import cases_after_breaks, without_cable
 from cdpr_drake.workspaces.static_feasibility import StaticCase, statically_feasible
 from cdpr_drake.workspaces.volume import workspace_volume

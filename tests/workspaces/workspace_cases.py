@@ -23,10 +23,10 @@ from cdpr_drake.analyses.workspaces.robot_conditions import static_case
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_judges import CertifiedKind
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_judges import CertifiedKind
+from cdpr_drake.proofs.certified_boxes import PoseBox
 from cdpr_drake.workspaces.cable_interference import clearances
-from cdpr_drake.workspaces.certified_boxes import PoseBox
 from cdpr_drake.workspaces.demanded_wrenches import resisting, weight_wrenches
 from cdpr_drake.workspaces.single_failure import survives_breaks
 from cdpr_drake.workspaces.static_feasibility import (

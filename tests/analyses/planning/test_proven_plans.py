@@ -16,11 +16,11 @@ from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.proofs.moving_clearances import moving_clearances
+from cdpr_drake.proofs.proven_sets import PoseSets
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.workspaces.cable_interference import box_row
 from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias
-from cdpr_drake.workspaces.moving_clearances import moving_clearances
-from cdpr_drake.workspaces.proven_sets import PoseSets
 from tests.analyses.planning.plan_command import drawn, planned, run, summary, table, undrawn
 from tests.messages import printed
 

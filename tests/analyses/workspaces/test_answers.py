@@ -26,8 +26,8 @@ from cdpr_drake.analyses.workspaces.robot_conditions import (
 from cdpr_drake.analyses.workspaces.workspace_hulls import robot_hull
 from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OUTSIDE
-from cdpr_drake.workspaces.box_grid_agreement import hull_agreement
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OUTSIDE
+from cdpr_drake.proofs.box_grid_agreement import hull_agreement
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.cli.commands import STORE_ARRAYS, ended, killed_after
 from tests.cli.conftest import only

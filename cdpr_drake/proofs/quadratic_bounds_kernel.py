@@ -98,9 +98,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix, copy_vector
-from cdpr_drake.stability.criterion_at_pose_kernel import CaseArrays, Work
-from cdpr_drake.stability.criterion_kernel import OUTSIDE, turn_after
-from cdpr_drake.stability.linear_forms_kernel import (
+from cdpr_drake.proofs.linear_forms_kernel import (
     add_cross,
     add_curvature,
     add_outer,
@@ -113,9 +111,11 @@ from cdpr_drake.stability.linear_forms_kernel import (
     gram,
     part_across,
 )
+from cdpr_drake.proofs.subdivision_kernel import BOXES, Piece
+from cdpr_drake.stability.criterion_at_pose_kernel import CaseArrays, Work
+from cdpr_drake.stability.criterion_kernel import OUTSIDE, turn_after
 from cdpr_drake.stability.perturbation_samples_kernel import COMMON, CORNERS
 from cdpr_drake.stability.stability_case import IBVS, PBVS
-from cdpr_drake.stability.subdivision_kernel import BOXES, Piece
 
 BALLS = 8
 """Vector blocks: f, dp, g, and of second order dp with f, dp with g, dp with dp, ff, f with g."""

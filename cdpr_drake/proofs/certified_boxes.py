@@ -9,8 +9,8 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_judges import CertifyTask, judge_all, several
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_judges import CertifyTask, judge_all, several
 
 CHUNK = 2048
 """Boxes between two looks at a request to stop."""

@@ -8,8 +8,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OPEN
+from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 

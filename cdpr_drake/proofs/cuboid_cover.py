@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces.cuboid_cover_kernel import best_cuboid, grow_cuboids, overlapping_pairs
+from cdpr_drake.proofs.cuboid_cover_kernel import best_cuboid, grow_cuboids, overlapping_pairs
 
 FIRST_SEEDS, MORE_SEEDS = 1024, 64
 """Cells that cuboids grow from at the beginning, and again after every cuboid that was taken."""

@@ -16,13 +16,13 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_distance_kernel import convex_work
 from cdpr_drake.geometry.convex_shapes import ConvexShape, packed
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.workspaces.box_collision_kernel import judge_cables, judge_collisions
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_collision_kernel import judge_cables, judge_collisions
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.proofs.cuboid_cover import SumTable
+from cdpr_drake.proofs.cuboid_cover_kernel import count_cells
+from cdpr_drake.proofs.proven_cells import ProvenCells
 from cdpr_drake.workspaces.cable_interference import Surroundings
-from cdpr_drake.workspaces.cuboid_cover import SumTable
-from cdpr_drake.workspaces.cuboid_cover_kernel import count_cells
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle, shapes_at, swept_by
-from cdpr_drake.workspaces.proven_cells import ProvenCells
 
 BORDER = 1e-11
 """Poses so far beside a cell count as in it, as its border is a rounded number; what is judged is

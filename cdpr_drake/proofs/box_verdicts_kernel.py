@@ -133,9 +133,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
-from cdpr_drake.workspaces.box_clearance_kernel import judge_box
-from cdpr_drake.workspaces.box_expansion_kernel import (
+from cdpr_drake.proofs.box_clearance_kernel import judge_box
+from cdpr_drake.proofs.box_expansion_kernel import (
     ANCHOR,
     EXIT,
     INSIDE,
@@ -147,15 +146,16 @@ from cdpr_drake.workspaces.box_expansion_kernel import (
     expand_demand,
     turn_axes,
 )
-from cdpr_drake.workspaces.box_inside_kernel import proves_inside
-from cdpr_drake.workspaces.box_outside_kernel import (
+from cdpr_drake.proofs.box_inside_kernel import proves_inside
+from cdpr_drake.proofs.box_outside_kernel import (
     central_direction,
     follow_cone,
     proves_open_cone,
     proves_outside,
 )
-from cdpr_drake.workspaces.box_pair_clearance_kernel import judge_pair, swing
-from cdpr_drake.workspaces.box_pulleys_kernel import see_pulleys, straight_points
+from cdpr_drake.proofs.box_pair_clearance_kernel import judge_pair, swing
+from cdpr_drake.proofs.box_pulleys_kernel import see_pulleys, straight_points
+from cdpr_drake.tensions.quadratic_program_kernel import workspace_shape
 from cdpr_drake.workspaces.wrench_facets_kernel import facet_normals, margin_along
 
 FREE = 1e-9

@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.box_judges import CertifyTask
-from cdpr_drake.workspaces.proven_cells import ProvenCells, prove_more
+from cdpr_drake.proofs.box_judges import CertifyTask
+from cdpr_drake.proofs.proven_cells import ProvenCells, prove_more
 
 ROUNDS = 12
 """Ways between two poses whose open cells are cut, one after the other, at most."""

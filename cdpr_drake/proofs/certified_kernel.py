@@ -28,19 +28,9 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix
-from cdpr_drake.stability.bound_ascent_kernel import bound_blocks, second_order_size
-from cdpr_drake.stability.criterion_at_pose_kernel import (
-    CaseArrays,
-    PoseRows,
-    Work,
-    evaluate,
-    new_work,
-    prepare,
-)
-from cdpr_drake.stability.perturbation_samples_kernel import CORNERS
-from cdpr_drake.stability.quadratic_bounds_kernel import Blocks, fill_blocks, new_blocks
-from cdpr_drake.stability.stability_case import IBVS
-from cdpr_drake.stability.subdivision_kernel import (
+from cdpr_drake.proofs.bound_ascent_kernel import bound_blocks, second_order_size
+from cdpr_drake.proofs.quadratic_bounds_kernel import Blocks, fill_blocks, new_blocks
+from cdpr_drake.proofs.subdivision_kernel import (
     BOXES,
     Piece,
     best_cut,
@@ -52,6 +42,16 @@ from cdpr_drake.stability.subdivision_kernel import (
     whole_piece,
     worst_axes,
 )
+from cdpr_drake.stability.criterion_at_pose_kernel import (
+    CaseArrays,
+    PoseRows,
+    Work,
+    evaluate,
+    new_work,
+    prepare,
+)
+from cdpr_drake.stability.perturbation_samples_kernel import CORNERS
+from cdpr_drake.stability.stability_case import IBVS
 
 ROUNDING = 1e-5
 """Share by which H is enlarged, and what is taken off the result at least, for rounding errors."""

@@ -44,7 +44,7 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.convex_distance_kernel import convex_gap
-from cdpr_drake.workspaces.box_expansion_kernel import (
+from cdpr_drake.proofs.box_expansion_kernel import (
     ANCHOR,
     EXIT,
     INSIDE,
@@ -53,8 +53,8 @@ from cdpr_drake.workspaces.box_expansion_kernel import (
     ROUNDING,
     turn_axes,
 )
-from cdpr_drake.workspaces.box_pair_clearance_kernel import dot
-from cdpr_drake.workspaces.box_pulleys_kernel import see_pulleys, straight_points
+from cdpr_drake.proofs.box_pair_clearance_kernel import dot
+from cdpr_drake.proofs.box_pulleys_kernel import see_pulleys, straight_points
 
 SLACK = 1e-9
 """Share of all coordinates by which boxes are enlarged: more than nearest points are known to."""

@@ -14,11 +14,11 @@ from pydrake.geometry.optimization import HPolyhedron, SaveIrisRegionsYamlFile
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces.cuboid_cover import cover_with
-from cdpr_drake.workspaces.cuboid_cover_kernel import overlapping_pairs
-from cdpr_drake.workspaces.proven_sets import ABOUT, NUMBER_NAMES, REGIONS
-from cdpr_drake.workspaces.timed_cells import BORDER, TimedCells
-from cdpr_drake.workspaces.timed_ways import CellWay, earliest_way
+from cdpr_drake.proofs.cuboid_cover import cover_with
+from cdpr_drake.proofs.cuboid_cover_kernel import overlapping_pairs
+from cdpr_drake.proofs.proven_sets import ABOUT, NUMBER_NAMES, REGIONS
+from cdpr_drake.proofs.timed_cells import BORDER, TimedCells
+from cdpr_drake.proofs.timed_ways import CellWay, earliest_way
 
 COVER, MOST_SETS = 0.9, 150
 """Usual share of the clear cells that sets cover, and sets at most, before those of ways."""

@@ -23,8 +23,8 @@ from numba import njit
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.numerics.linear_algebra_kernel import copy_matrix
-from cdpr_drake.stability.quadratic_bounds_kernel import BALL_SIZES, BALLS, Blocks
-from cdpr_drake.stability.subdivision_kernel import BOXES
+from cdpr_drake.proofs.quadratic_bounds_kernel import BALL_SIZES, BALLS, Blocks
+from cdpr_drake.proofs.subdivision_kernel import BOXES
 
 IDENTITY_SHARE = 1e-3
 """Share of the identity in the density matrix, so that the parameters stay finite."""

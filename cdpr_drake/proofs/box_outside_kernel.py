@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.box_expansion_kernel import NUMBERS, ROUNDING
+from cdpr_drake.proofs.box_expansion_kernel import NUMBERS, ROUNDING
 
 SMALL_PIVOT = 1e-9
 """Where a pivot is smaller the normal is not turned."""

@@ -19,12 +19,13 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
-from cdpr_drake.planning.path_in_sets import COSTS
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import PathPlan
-from cdpr_drake.planning.set_curve import LONGER, SetCurve
-from cdpr_drake.planning.timed_curve import RateLimits, TimedBoxes, largest_rates, timed_curve
-from cdpr_drake.planning.timed_sequences import TimedGraph, TimedSequence
+from cdpr_drake.proofs.path_in_sets import COSTS
+from cdpr_drake.proofs.set_curve import LONGER, SetCurve
+from cdpr_drake.proofs.timed_curve import RateLimits, TimedBoxes, largest_rates, timed_curve
+from cdpr_drake.proofs.timed_sequences import TimedGraph, TimedSequence
+from cdpr_drake.proofs.timed_sets import TimedSets
 from cdpr_drake.trajectories.pose_path import (
     DEGREE,
     PIECE_NUMBERS,
@@ -32,7 +33,6 @@ from cdpr_drake.trajectories.pose_path import (
     PosePath,
 )
 from cdpr_drake.trajectories.timed_path import TimedPath
-from cdpr_drake.workspaces.timed_sets import TimedSets
 
 CARE = (0.0, 0.05, 0.1, 0.2, 0.35, 0.6, 1.0)
 """Between the time of a straight motion and that with a rest at every corner: what is tried."""

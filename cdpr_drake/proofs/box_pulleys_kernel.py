@@ -12,7 +12,7 @@ from numba import njit
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.pulley_kernel import PULLEY_RADIUS, tangent
 from cdpr_drake.geometry.two_pulleys_kernel import ANCHOR_RADIUS
-from cdpr_drake.workspaces.box_expansion_kernel import ANCHOR, BEND, EXIT, GAIN, ROUNDING, turn_axes
+from cdpr_drake.proofs.box_expansion_kernel import ANCHOR, BEND, EXIT, GAIN, ROUNDING, turn_axes
 
 SWIVEL, ANCHOR_SWIVEL = 10, 14
 """First columns of the axes in a row of `CableSet.packed()`, next to the radii."""

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.timed_cells import TimedCells
+from cdpr_drake.proofs.timed_cells import TimedCells
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ import numpy as np
 from pydrake.solvers import ClarabelSolver, MathematicalProgram
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.set_curve import DEGREE, MARGIN, SetCurve, joined_controls
-from cdpr_drake.workspaces.timed_cells import BORDER
+from cdpr_drake.proofs.set_curve import DEGREE, MARGIN, SetCurve, joined_controls
+from cdpr_drake.proofs.timed_cells import BORDER
 
 INNER = 1e-6
 """Limits of speed and acceleration are kept by this share of them more than is asked, as the solver

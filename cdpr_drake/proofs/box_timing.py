@@ -23,9 +23,9 @@ from cdpr_drake.errors import PlanningError
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
-from cdpr_drake.planning.set_curve import control_points
 from cdpr_drake.planning.station_kernel import BASIS, T_0, T_U, T_X
-from cdpr_drake.planning.turning_bounds import turning_bounds
+from cdpr_drake.proofs.set_curve import control_points
+from cdpr_drake.proofs.turning_bounds import turning_bounds
 from cdpr_drake.trajectories.pose_path import DEGREE, POSE_NUMBERS, PosePath
 from cdpr_drake.trajectories.timed_path import TimedPath
 from cdpr_drake.workspaces.inertial_wrenches import inertia_about_mass_centre

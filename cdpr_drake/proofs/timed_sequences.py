@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.planning.set_sequences import least_ways
-from cdpr_drake.workspaces.timed_sets import TimedSets
+from cdpr_drake.proofs.set_sequences import least_ways
+from cdpr_drake.proofs.timed_sets import TimedSets
 
 MOST_LABELS = 4
 """Labels of an overlap that are followed, at most."""

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE, ROUNDING
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE, ROUNDING
 from cdpr_drake.workspaces.cable_distance_kernel import segments_shares
 
 PARALLEL = 1e-6

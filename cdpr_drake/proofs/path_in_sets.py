@@ -23,11 +23,12 @@ from pydrake.solvers import ClarabelSolver
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import PlanningError, accepted_names
 from cdpr_drake.geometry.poses import pose_from_angles, pose_row
-from cdpr_drake.planning.box_timing import BoxTiming, mass_centres, time_within_box
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS, PathPlan, plan_along_path
-from cdpr_drake.planning.set_curve import SetCurve, fast_curve, floored, shares_of, smooth_curve
-from cdpr_drake.planning.set_sequences import OverlapGraph, SetSequence
+from cdpr_drake.proofs.box_timing import BoxTiming, mass_centres, time_within_box
+from cdpr_drake.proofs.proven_sets import NUMBER_NAMES, PoseSets
+from cdpr_drake.proofs.set_curve import SetCurve, fast_curve, floored, shares_of, smooth_curve
+from cdpr_drake.proofs.set_sequences import OverlapGraph, SetSequence
 from cdpr_drake.trajectories.pose_path import (
     DEGREE,
     PIECE_NUMBERS,
@@ -35,7 +36,6 @@ from cdpr_drake.trajectories.pose_path import (
     PosePath,
     hermite,
 )
-from cdpr_drake.workspaces.proven_sets import NUMBER_NAMES, PoseSets
 
 METHODS = ("sequences", "gcs")
 """How sets are chosen: by short sequences, or by a graph of convex sets."""

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.proofs.box_expansion_kernel import NUMBERS, ROUNDING
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE, nearest_tensions_in
-from cdpr_drake.workspaces.box_expansion_kernel import NUMBERS, ROUNDING
 
 START_SHARE = 1e-4
 """The search for the analytic centre begins at least this share of the range within the bounds."""

@@ -20,11 +20,11 @@ from scipy.sparse.csgraph import connected_components
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
+from cdpr_drake.proofs.box_expansion_kernel import NUMBERS
+from cdpr_drake.proofs.cuboid_cover import cover_cells
+from cdpr_drake.proofs.cuboid_cover_kernel import overlapping_pairs
+from cdpr_drake.proofs.proven_cells import SAME_NUMBER, ProvenCells
 from cdpr_drake.schema.yaml_files import load_yaml
-from cdpr_drake.workspaces.box_expansion_kernel import NUMBERS
-from cdpr_drake.workspaces.cuboid_cover import cover_cells
-from cdpr_drake.workspaces.cuboid_cover_kernel import overlapping_pairs
-from cdpr_drake.workspaces.proven_cells import SAME_NUMBER, ProvenCells
 
 COVER = 0.97
 """Usual share of the proven cells that sets cover."""

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, OPEN, OUTSIDE, ROUNDING
-from cdpr_drake.workspaces.box_pair_clearance_kernel import (
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE, ROUNDING
+from cdpr_drake.proofs.box_pair_clearance_kernel import (
     FREE_AXIS,
     PARALLEL,
     dot,

@@ -15,11 +15,11 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OUTSIDE
-from cdpr_drake.workspaces.box_judges import CertifyTask
-from cdpr_drake.workspaces.box_refinement import refine
-from cdpr_drake.workspaces.certified_boxes import CertifiedBoxes, PoseBox, certify
-from cdpr_drake.workspaces.cuboid_cover_kernel import add_shares
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OUTSIDE
+from cdpr_drake.proofs.box_judges import CertifyTask
+from cdpr_drake.proofs.box_refinement import refine
+from cdpr_drake.proofs.certified_boxes import CertifiedBoxes, PoseBox, certify
+from cdpr_drake.proofs.cuboid_cover_kernel import add_shares
 
 LATTICE = 30
 """A box of poses is 2^LATTICE units of the lattice wide along each number: finer than its boxes."""

@@ -13,9 +13,9 @@ from cdpr_drake.errors import WorkspaceError
 from cdpr_drake.geometry.convex_distance_kernel import convex_work
 from cdpr_drake.geometry.convex_shapes import packed
 from cdpr_drake.numerics.kernel_calls import over_rows
-from cdpr_drake.workspaces.box_collision_kernel import judge_cables, judge_collisions
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_verdicts_kernel import judge_boxes, judge_clearances
+from cdpr_drake.proofs.box_collision_kernel import judge_cables, judge_collisions
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_verdicts_kernel import judge_boxes, judge_clearances
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
 from cdpr_drake.workspaces.cable_interference import Surroundings
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet

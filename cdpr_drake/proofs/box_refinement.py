@@ -11,9 +11,9 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import WorkspaceError
-from cdpr_drake.workspaces.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
-from cdpr_drake.workspaces.box_judges import CertifyTask, judge_all, several
-from cdpr_drake.workspaces.certified_boxes import (
+from cdpr_drake.proofs.box_expansion_kernel import INSIDE, NUMBERS, OPEN, OUTSIDE
+from cdpr_drake.proofs.box_judges import CertifyTask, judge_all, several
+from cdpr_drake.proofs.certified_boxes import (
     CHUNK,
     BoxJournal,
     CertifiedBoxes,
