@@ -31,6 +31,7 @@ from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.result import CalibrationResult, Fit, Outlier
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_statics import rigid_platform
 from tests.analyses.fits.attack import attacks, clean, hangprinter, outcome, scene
 from tests.analyses.fits.logs import numbers
 from tests.figure_faults import figure_faults
@@ -287,7 +288,7 @@ def stretch(begin):
     force = np.outer(20.0 * time, [0.0, 0.0, 1.0])
     rest = SimpleNamespace(time=time, force=force, means=lambda values: values[:96])
     return SimpleNamespace(
-        stretch=SimpleNamespace(time=begin + time, known=np.ones(121)), measured_turns=turns,
+        stretch=SimpleNamespace(time=begin + time, covered=np.ones(121, bool)), measured_turns=turns,
         predicted_turns=0.9 * turns, lead=0.8, unexplained=rest,
     )  # fmt: skip
 
@@ -297,7 +298,7 @@ def motion(count):
     return SimpleNamespace(
         task=SimpleNamespace(robot=robot), held_out=[stretch(6.78)], values=None,
         fitted=[stretch(float(k)) for k in range(count - 1)],
-        model=SimpleNamespace(by_name=lambda values: {"mass": robot.platform.mass}),
+        model=SimpleNamespace(platform=lambda values: rigid_platform(robot)),
     )  # fmt: skip
 
 
