@@ -288,8 +288,8 @@ def stretch(begin):
     force = np.outer(20.0 * time, [0.0, 0.0, 1.0])
     rest = SimpleNamespace(time=time, force=force, means=lambda values: values[:96])
     return SimpleNamespace(
-        stretch=SimpleNamespace(time=begin + time, covered=np.ones(121, bool)), measured_turns=turns,
-        predicted_turns=0.9 * turns, lead=0.8, unexplained=rest,
+        stretch=SimpleNamespace(time=begin + time, covered=np.ones(121, bool)), lead=0.8,
+        measured_turns=turns, predicted_turns=0.9 * turns, unexplained=rest,
     )  # fmt: skip
 
 
