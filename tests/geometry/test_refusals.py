@@ -95,7 +95,7 @@ BY_ERROR = {
     },
     RobotFileError: {
         "axis": (
-            lambda: robot("planar", swivel_axis=[0, 0, 0]), "pulley.swivel_axis: found (0, 0, 0)"
+            lambda: robot("planar", swivel_axis=[0, 0, 0]), "pulley.swivel_axis: found [0, 0, 0]"
         ),
         "arm and pulley": (
             lambda: robot("maslow_4", radius=0.02), "pulley.arm: found 0.1534 with pulleys"
