@@ -223,7 +223,7 @@ REFUSED = {
         ("log.csv --out x.csv --plot x.bmp", "x.bmp: found the ending '.bmp'"),
         ("log.csv --out x.csv --plot x", "x: found the ending ''; accepted: png"),
         ("log.csv --out x.csv --plot no/x.png", "there is no folder no"),
-        ("log.csv --out x.csv --rate -5", "--rate: found '-5'; accepted: above 0"),
+        ("log.csv --out x.csv --rate -5", "--rate: found -5.0; accepted: above 0"),
         ("log.csv --out x.csv --unit mm", "accepted: DIMENSION=UNIT, as length=mm"),
         ("log.csv --out x.csv --every 0", "--every: found '0'; accepted: a whole number, at least"),
         ("empty.csv --out x.csv", "empty.csv: found an empty file; accepted: a log"),
