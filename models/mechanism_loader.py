@@ -119,6 +119,8 @@ def _scope(mechanism: Mechanism, path: Path) -> Scope:
     """Makes folders of packages and the file of bodies absolute, and adds packages near it."""
     here = path.absolute().parent
     folders = {name: str((here / at).resolve()) for name, at in mechanism.packages.items()}
+    missing = [name for name, folder in folders.items() if not Path(folder).is_dir()]
+    refused = [(f"packages.{name}", mechanism.packages[name], "a folder") for name in missing]
     below = sorted(here.iterdir()) if here.is_dir() else []  # gone, where its files were read
     near = [here, *here.parents, *(child for child in below if child.is_dir())]
     found, elsewhere = PackageMap.MakeEmpty(), PackageMap.MakeEmpty()
@@ -142,7 +144,7 @@ def _scope(mechanism: Mechanism, path: Path) -> Scope:
             mechanism.mechanism = known.ResolveUrl(mechanism.mechanism)
     elif input_there(here / mechanism.mechanism):
         mechanism.mechanism = str(here / mechanism.mechanism)
-    return Scope(mechanism, path)
+    return Scope(mechanism, path, more=(lambda scope: iter(refused),))
 
 
 def _checked_in_plant(mechanism: Mechanism, path: Path) -> Mechanism:

@@ -161,9 +161,6 @@ class Mechanism(Summarized):
         yield from repeated((cable.name for cable in self.cables), "cables[{}].name")
         if self.cable.behaviour is not None:
             yield "cable.behaviour", "a section", "null: mechanisms have elastic cables"
-        for name, folder in self.packages.items():
-            if not Path(folder).is_dir():
-                yield f"packages.{name}", folder, "a folder"
         if not self.mechanism.lower().endswith(MODEL_SUFFIXES):
             yield "mechanism", self.mechanism, f"a file that ends in {', '.join(MODEL_SUFFIXES)}"
         elif self.mechanism.startswith(URL):

@@ -1,5 +1,7 @@
 """What files, formats, commands and analyses do not take of a motion type is refused by name."""
 
+import re
+
 import numpy as np
 import pytest
 import yaml
@@ -48,11 +50,12 @@ def test_gravity_is_a_vector():
     ("name", "changes", "field", "accepted"),
     [
         ("tripod", {"platform": POINT | {"center_of_mass": [0, 0, 0.1]}},
-         "platform.center_of_mass", "null, or Po, 0 0 0, of a point mass, 3T"),
+         "platform.center_of_mass", "Po, 0 0 0, of a point mass, 3T"),
         ("hanging_four", {"motion": "3T"}, "cables[0].anchor_point",
          "Po, 0 0 0, of a point mass, 3T"),
         ("tripod", {"axis": [1, 0, 0]}, "axis", "null for 3T"),
-        ("slope", {"axis": [0, 0, 0]}, "axis", "a direction, not zero, or null"),
+        ("slope", {"axis": [0, 0, 0]}, "axis",
+         "3 numbers, not all zero [-] or null"),
         ("upright_point", {"plane_height": 0.3}, "plane_height",
          "a height for robots in a horizontal plane, null for others"),
         ("upright_body", {"home": {"position": [0.1, 0.2, 0.3], "angles_deg": [10, 0, 0]}},
@@ -60,16 +63,16 @@ def test_gravity_is_a_vector():
         ("beam", {"axis": [1, 0, 0]}, "cables[0].anchor_point",
          "a point of the beam's axis, through Po along (1, 0, 0)"),
         ("beam", {"platform": BEAM | {"size": [0.05, 0.08, 0.6]}}, "platform.inertia",
-         "that of a body of revolution about (0, 0, 1); its spin does not count"),
+         "that of a body of revolution about (0, 0, 1); its spin is no matter"),
         ("tilted_gravity", {"gravity_direction": [0, 0, 0]}, "gravity_direction",
-         "a direction, not zero"),
+         "3 numbers, not all zero [-]"),
     ],
 )  # fmt: skip
 def test_refusal_of_a_file(name, changes, field, accepted):
     with pytest.raises(RobotFileError) as caught:
         small_robot(name, **changes)
     first = str(caught.value).splitlines()[0]
-    assert first.startswith(f"{name}.yaml: {field}: found ")
+    assert re.match(rf"{name}\.yaml:\d+: {re.escape(field)}: found ", first)
     assert first.endswith(f"; accepted: {accepted}")
 
 
