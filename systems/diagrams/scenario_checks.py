@@ -98,7 +98,7 @@ def _estimators(scope: Scope) -> Iterator[Refusal]:
 
 
 def _one_of(names: list[str]) -> str:
-    return f"one of {', '.join(names)}" if names else "none, since there is none"
+    return f"one of {', '.join(names)}" if names else "a robot with such a camera"
 
 
 def _mount(scope: Scope) -> Iterator[Refusal]:

@@ -59,7 +59,7 @@ def test_a_robot_without_a_camera_is_asked_for_all_but_what_a_camera_sees():
     grids = {name: frame_grid(name, (3, 3, 3)) for name in ("caroca_gazebo", "planar")}
     _, kinds, _, left_out = possible_kinds("caroca_gazebo", grids["caroca_gazebo"])
     assert set(OF_POSES) - set(kinds) == set(left_out) == {"target-visible"}
-    assert left_out["target-visible"].startswith("caroca_pbvs.yaml: camera.mount")
+    assert left_out["target-visible"].startswith("caroca_pbvs.yaml:17: camera.mount")
     assert possible_kinds("planar", grids["planar"])[3] == {}
 
 

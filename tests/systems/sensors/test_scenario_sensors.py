@@ -132,7 +132,7 @@ REFUSED = [
     (LOOKING, "sensors.pan_tilt=null",
      "range_sensors[1].carrier: found pan_tilt, which is not there"),
     (LOOKING, "sensors.pan_tilt.lower_deg=[80,0]",
-     "pan_tilt.lower_deg: accepted: at most upper_deg"),
+     "pan_tilt.lower_deg: found (80, 0); accepted: at most upper_deg"),
     (LOOKING, "sensors.depth.carrier=hose",
      "depth.carrier: found hose, which is not there; accepted"),
     (LOOKING, "target.motion=null",
