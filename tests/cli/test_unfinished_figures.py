@@ -71,8 +71,8 @@ def test_a_fit_that_stops_before_its_figures_keeps_its_numbers(asked, here, monk
             ended(*words)
     names = [name for name in os.listdir("fit") if name.endswith((".json", ".yaml"))]
     numbers = {name: told(name) for name in names if not name.startswith(".")}
-    assert len(numbers) == 2
+    assert len(numbers) == 3  # results, what was shown, the model
     assert ended(*words) == 0
     assert any(name.endswith(".png") for name in os.listdir("fit"))
+    assert ended(*words) == 0  # read again
     assert {name: told(name) for name in numbers} == numbers
-    assert "--overwrite" in refuse(capsys, *words)
