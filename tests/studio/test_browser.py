@@ -165,7 +165,7 @@ def test_a_point_is_dragged_with_the_mouse(page):
 
 def test_a_wrong_value_is_said_and_taken_back(page):
     type_into(page, "cables 0 exit point x", "wrong")
-    wait_for(page, "document.body.innerText.includes('found wrong; accepted: 3 numbers [m]')")
+    wait_for(page, "document.body.innerText.includes('found wrong; accepted: 3 numbers')")
     type_into(page, "cables 0 exit point x", "-0.37")
     wait_for(page, "!document.body.innerText.includes('found wrong')")
 

@@ -41,10 +41,10 @@ async def test_a_field_changes_the_robot_and_its_tensions(user, bench):
 @pytest.mark.parametrize(
     ("name", "words", "said"),
     [
-        (CASE, "abc", "found abc; accepted: 3 numbers [m]"),
-        (CASE, "", "found nothing; accepted: 3 numbers [m]"),
-        (CASE, "nan", "found nan; accepted: 3 numbers [m]"),
-        ("platform-mass", "-1", "platform.mass: found -1; accepted: a number > 0 [kg]"),
+        (CASE, "abc", "found abc; accepted: 3 numbers >= -10000"),
+        (CASE, "", "found nothing; accepted: 3 numbers >= -10000"),
+        (CASE, "nan", "found nan; accepted: 3 numbers >= -10000"),
+        ("platform-mass", "-1", "platform.mass: found -1; accepted: a number > 0 and"),
         ("tension_bounds-lower", "70", "accepted: lower < upper"),
         ("name", "../x", "accepted: 1 to 64 letters"),
         ("cables-1-name", "C1", "accepted: each name once"),

@@ -38,7 +38,11 @@ def test_changes_are_settings_and_the_old_text_is_none(tmp_path):
         ("duration", "-1", "found -1; accepted: a number > 0 [s]"),
         ("duration", "a: b: c", "which is not YAML"),
         ("controller.lambda_0", "fast", "found fast; accepted: a number"),
-        ("initial_pose.position", "[1, 2]", "found [1, 2]; accepted: 3 numbers [m]"),
+        (
+            "initial_pose.position",
+            "[1, 2]",
+            "found [1, 2]; accepted: 3 numbers >= -10000 and <= 10000 [m]",
+        ),
         ("camera.kind", "painted", "found painted; accepted: one of"),
     ],
 )

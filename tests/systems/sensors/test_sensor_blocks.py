@@ -35,7 +35,7 @@ VIVE = load_pose_sensor("vive")
 X_WP = RigidTransform(RollPitchYaw(0.2, -0.1, 0.3), [0.3, -0.2, 0.4])
 REFERENCE = np.array([1.0, 1.5, 0.8])
 DRUM = Drum(radius=0.041, gear_ratio=10.0, layer_turns=4.0, layer_height=0.002, wound=1.2)
-COARSE = EncoderModel(name="coarse", counts_per_turn=100, rate_hz=1000.0)
+COARSE = EncoderModel(name="coarse", title="", source="", counts_per_turn=100, rate_hz=1000.0)
 
 
 def readings(sensor, source, value, port, times):
@@ -167,7 +167,7 @@ def test_lengths_are_right_to_half_a_count(paid_out):
 
 def test_a_controller_that_ignores_the_layers_is_wrong_by_them():
     plain = Drum(radius=0.041, gear_ratio=10.0)
-    fine = EncoderModel(name="fine", counts_per_turn=2**24, rate_hz=1000.0)
+    fine = EncoderModel(name="fine", title="", source="", counts_per_turn=2**24, rate_hz=1000.0)
     lengths = REFERENCE + 0.3
     _, found = encoded(MotorEncoders(fine, DRUM, REFERENCE, plain), lengths)
     turned = DRUM.motor_angles(np.full(3, 0.3))
