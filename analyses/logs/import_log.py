@@ -159,17 +159,6 @@ def with_mapping(facts: Facts, path: Path) -> Facts:
     )  # fmt: skip
 
 
-OPTIONS = """log_format: Reader; auto says which and why.
-        unit: Units that the file does not state, as length=mm,force=N.
-        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
-            header; skip_rows, separator, rate_hz.
-        rate: Rows per second, for files without times [1/s].
-        body: Rigid body of a tracker that is the platform.
-        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
-        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y."""
-"""Arguments of the verbs that read a log."""
-
-
 @verb()
 def import_log(
     file: InputFile, /, *, out: OutFile = None,
@@ -193,7 +182,14 @@ def import_log(
         file: The log.
         out: CSV file to write.
         beside: Log of the same motion by another recorder.
-        OPTIONS
+        log_format: Reader; auto says which and why.
+        unit: Units that the file does not state, as length=mm,force=N.
+        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
+            header; skip_rows, separator, rate_hz.
+        rate: Rows per second, for files without times [1/s].
+        body: Rigid body of a tracker that is the platform.
+        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
+        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
         with_format: Reader of the other log.
         robot: Robot whose cable names the columns take.
         cables: Names of the cables in the order of the log, as A,B,C,D.
@@ -233,9 +229,7 @@ def import_log(
 
 
 READERS = "\n    ".join(f"- {name}: {how.title}" for name, how in DIALECTS.items())
-import_log.__doc__ = (
-    (import_log.__doc__ or "").replace("READERS", READERS).replace("OPTIONS", OPTIONS)
-)
+import_log.__doc__ = (import_log.__doc__ or "").replace("READERS", READERS)
 
 
 def unused_facts(log: Log, facts: Facts) -> list[str]:

@@ -34,7 +34,6 @@ from cdpr_drake.analyses.frame.words import (
 from cdpr_drake.analyses.logs.columns import LENGTH, PARTS, POSITION, QUATERNION, SECONDS
 from cdpr_drake.analyses.logs.dialects import AUTO, read_log
 from cdpr_drake.analyses.logs.import_log import (
-    OPTIONS,
     Axes,
     LogFormat,
     MappingFile,
@@ -310,7 +309,14 @@ def replay_log(
         fit_frame: Fit the tracker's frame to the positions that the model has for the measured
             lengths; without, the tracker measures in W.
         drive: Also drive the simulated robot with the log's cable lengths.
-        OPTIONS
+        log_format: Reader; auto says which and why.
+        unit: Units that the file does not state, as length=mm,force=N.
+        mapping: YAML file of what columns are: columns: [time_s, C1_length_mm, ''], or name:
+            header; skip_rows, separator, rate_hz.
+        rate: Rows per second, for files without times [1/s].
+        body: Rigid body of a tracker that is the platform.
+        topic: Topics of a bag of ROS that are read, as /tracker/pose,/winches; default: all.
+        axes: Axes of a tracker's file that are x,y,z of W, as z,x,y or -z,-x,y.
         out: Results folder; default: a new one below runs/; in Python nothing is kept.
         overwrite: Replace results in the folder.
         formats: Files of each figure: png, pdf, svg, or several, as png,pdf.
@@ -346,9 +352,6 @@ def replay_log(
             replay = replace(replay, folder=folder.path)
             write_result(replay, folder, formats, follow, replay.pages())
     return replay
-
-
-replay_log.__doc__ = (replay_log.__doc__ or "").replace("OPTIONS", OPTIONS)
 
 
 def compare_log(robot: Robot, log: Log, fit_frame: bool = False) -> Replay:
