@@ -7,8 +7,7 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 
 LEAST_ALIKE = 0.65
 """How alike a name must be to one that was meant, of 1 [-]; "magic" and "image" are by 0.6."""
@@ -103,20 +102,6 @@ class Problems:
         if len(self._found) >= MOST_PROBLEMS:
             self._found[MOST_PROBLEMS:] = ["there may be more problems than these"]
             self.raise_any()
-
-    @contextmanager
-    def collected(self) -> Iterator[None]:
-        """Notes an error of this class that ends the block.
-
-        Once there is a problem, any other error may follow from it, and is left out.
-        """
-        try:
-            yield
-        except self._error as problem:
-            self.add(*problem.problems)
-        except Exception:
-            if not self._found:
-                raise
 
     def raise_any(self) -> None:
         """Raises what was found, if anything.

@@ -17,7 +17,13 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import yaml
 
-from cdpr_drake.errors import DataFileError, Problems, meant_names, why_not_read
+from cdpr_drake.errors import (
+    MOST_PROBLEMS,
+    DataFileError,
+    Problems,
+    meant_names,
+    why_not_read,
+)
 from cdpr_drake.schema.declarations import Scope, Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (
@@ -311,8 +317,8 @@ class _Problems:
         self._said.append((line, f"{file}{key + ': ' if key else ''}{words}"))
 
     def add_all(self, errors: Iterable[Any]) -> None:
-        """What pydantic found."""
-        errors = list(errors)
+        """What pydantic found, no more of it than anybody reads."""
+        errors = list(errors)[:MOST_PROBLEMS]
         unknown = [error["loc"] for error in errors if error["type"] in _UNKNOWN]
         meant = {
             (*at[:-1], name)
