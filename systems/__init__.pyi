@@ -23,7 +23,6 @@ from .diagrams.tension_control import TensionControl as TensionControl
 from .diagrams.tension_control import TensionControlSettings as TensionControlSettings
 from .diagrams.tension_control import add_tension_control as add_tension_control
 from .diagrams.tension_control import build_tension_control as build_tension_control
-from .diagrams.visual_servo import Addition as Addition
 from .diagrams.visual_servo import VisualServo as VisualServo
 from .diagrams.visual_servo import build_visual_servo as build_visual_servo
 from .estimators.basic_estimators import ControlIntegration as ControlIntegration
@@ -75,6 +74,7 @@ from .scenarios.files import scenario_names as scenario_names
 from .scenarios.tension_control_scenario import TensionScenario as TensionScenario
 from .scenarios.visual_servo_scenario import Scenario as Scenario
 from .scenarios.visual_servo_scenario import VisualServoSettings as VisualServoSettings
+from .sections import Section as Section
 from .sensors.inertial_sensor import InertialSensor as InertialSensor
 from .sensors.motor_encoders import MotorEncoders as MotorEncoders
 from .sensors.pose_sensor import PoseSensor as PoseSensor

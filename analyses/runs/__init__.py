@@ -3,7 +3,7 @@
 * A kind of scenario is one class, such as `ServoRun`, whose object is a run from the scenario to
   the results folder, see `Run`. What steps it is an `Engine`: a diagram in Drake's simulator, or a
   loop without one.
-* A subject of a run, such as contact or a sensor, is one `Section`: its numbers and its figure.
+* A subject of a run, such as contact or a sensor, is one `Subject`: its numbers and its figure.
 * The log grows on disk, with checkpoints beside it, so whatever ends the program loses a few
   seconds of a run. A run that goes on comes to the same numbers as an uninterrupted one, bit for
   bit.

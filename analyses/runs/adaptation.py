@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import line_style, new_figure, spread
-from cdpr_drake.analyses.runs.run import Run, Section
+from cdpr_drake.analyses.runs.run import Run, Subject
 from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.identifiability import FRAMES
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -186,7 +186,9 @@ def adaptation_figure(run: Run) -> Figure:
     return figure
 
 
-LEARNT_POINTS = Section(
-    "adaptation", lambda run: LEARNT in run.log, adaptation_numbers,
+LEARNT_POINTS = Subject(
+    "adaptation",
+    adaptation_numbers,
     {"adaptation": adaptation_figure},
-)  # fmt: skip
+    applies=lambda run: LEARNT in run.log,
+)

@@ -259,7 +259,6 @@ _PARTS = {
     "servo_mode": ("image_flag", "switches", "l_pose", "l_image", "pose_bound", "image_bound"),
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
     "desired_wrench": _WRENCH, "applied_wrench": _WRENCH, "wrench_estimated": _WRENCH,
-    "wrench_sigma": _WRENCH, "wrench_skipped": ("no_pose", "no_direction"),
     "displacement": ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
     "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),
     "angular_velocity": ("x_rad_s", "y_rad_s", "z_rad_s"),
@@ -277,20 +276,22 @@ _PER_CABLE = {
 }  # fmt: skip
 
 
-def column_names(log: Log, names: Mapping[str, Sequence[str]]) -> list[str]:
+def column_names(log: Log, names: Mapping[str, Sequence[str] | str]) -> list[str]:
     """Names of the columns of `log.csv`, each ending in its unit, if it has one.
 
     Args:
         log: The log.
-        names: Of "cables", of "error" of features, and of numbers of further quantities.
+        names: Of "cables", of "error" of features, and of the numbers of further quantities; or
+            the unit of a quantity with a number for each cable.
     """
-    columns, named = ["time_s"], {**_PARTS, **names}
+    columns, named = ["time_s"], {**_PARTS, **_PER_CABLE, **names}
     for quantity in log:
         if quantity == "time":
             continue
         size = log_block(log, quantity, 0, 1).shape[1]
-        if quantity in _PER_CABLE:
-            endings = [f"{cable}_{_PER_CABLE[quantity]}" for cable in names["cables"]]
+        known = named.get(quantity, ())
+        if isinstance(known, str):
+            endings = [f"{cable}_{known}" for cable in names["cables"]]
         elif quantity.startswith("scan_") or quantity == "depth_row":
             endings = [f"{k}_m" for k in range(size)]
         elif quantity.startswith("X_"):
@@ -300,13 +301,13 @@ def column_names(log: Log, names: Mapping[str, Sequence[str]]) -> list[str]:
         elif quantity == "ellipses_px":
             endings = [f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE]
         else:
-            endings = list(named.get(quantity) or map(str, range(size)))
+            endings = list(known or map(str, range(size)))
         assert len(endings) == size
         columns += [f"{quantity}.{part}" for part in endings]
     return columns
 
 
-def write_log(folder: Folder, log: Log, names: Mapping[str, Sequence[str]]) -> None:
+def write_log(folder: Folder, log: Log, names: Mapping[str, Sequence[str] | str]) -> None:
     """Writes `log.npz`, an array a quantity, and `log.csv`, a column a number, piece by piece."""
     with folder.file("log.npz") as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as arrays:
         for name in log:

@@ -14,6 +14,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -57,6 +58,7 @@ from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.typed_yaml import plain_values
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.files import scenario_names
+from cdpr_drake.systems.sections import load_object, sections_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -68,23 +70,31 @@ PIECE = 0.1
 
 
 @dataclass(frozen=True)
-class Section:
-    """A subject of a run: its numbers in the summary, its figures, or both; see `Run.sections`.
+class Subject:
+    """A subject of a run: its numbers in the summary, its figures, or both.
+
+    A kind of run has its subjects in `Run.subjects`, a section of a scenario in its `report`.
 
     Attributes:
         key: Key of the numbers in `summary.json`; empty: none of its own.
-        applies: True for a run that has the subject.
         numbers: Returns the numbers of a run.
         figures: Functions that draw a run, by names of files without ending; or what returns
             functions without arguments, by such names, of a run.
+        applies: True for a run that has the subject.
     """
 
     key: str
-    applies: Callable[[Any], Any]
     numbers: Callable[[Any], Any] | None = None
     figures: Mapping[str, Callable[[Any], Figure]] | Callable[[Any], Mapping[str, Any]] | None = (
         None
     )
+    applies: Callable[[Any], Any] = lambda run: True
+
+    def drawn(self, run: Any) -> dict[str, Callable[[], Figure]]:
+        """What draws a run, by the names of files without ending."""
+        if callable(self.figures):
+            return dict(self.figures(run))
+        return {name: partial(draw, run) for name, draw in (self.figures or {}).items()}
 
 
 class Run(Result):
@@ -92,7 +102,8 @@ class Run(Result):
 
     Attributes:
         kind: Of its scenario, as a file gives it.
-        sections: Subjects that a run may have, in the order of `summary.json`.
+        subjects: Subjects that a run may have, in the order of `summary.json`, before those of
+            the sections of its scenario.
         scenario: The scenario.
         built: The diagram and its handles, made at the first use.
         robot: The robot, or the mechanism.
@@ -109,7 +120,7 @@ class Run(Result):
     """
 
     kind: ClassVar[str]
-    sections: ClassVar[Sequence[Section]] = ()
+    subjects: ClassVar[Sequence[Subject]] = ()
     built: Any
     log: Log
 
@@ -170,9 +181,13 @@ class Run(Result):
         """What lets Meshcat follow it; None: nothing does."""
         return None
 
-    def log_names(self) -> dict[str, Sequence[str]]:
-        """Names of cables, features, and the numbers of further quantities of the log."""
-        return {"cables": [cable.name for cable in self.robot.cables]}
+    def log_names(self) -> dict[str, Sequence[str] | str]:
+        """Names of cables and features, and of the numbers of further quantities of the log, or
+        the unit of those that have a number for each cable."""
+        names: dict[str, Sequence[str] | str] = {}
+        for _, section in sections_of(self.scenario):
+            names |= section.columns
+        return names | {"cables": [cable.name for cable in self.robot.cables]}
 
     def arguments(self) -> dict[str, Any]:
         """All that the run depends on, for JSON: code, scenario, and files by their contents."""
@@ -347,14 +362,23 @@ class Run(Result):
     @cached_property
     def _summary(self) -> dict[str, Any]:
         summary = self.numbers()
-        for section in self.sections:
-            if section.key and section.numbers is not None and section.applies(self):
-                summary[section.key] = section.numbers(self)
+        for subject in self._applying():
+            if subject.key and subject.numbers is not None:
+                summary[subject.key] = subject.numbers(self)
         remote = getattr(self.built, "remote", None)
         if remote is not None:
             summary["remote"] = remote.report()
         cleaned: dict[str, Any] = finite(summary)
         return cleaned
+
+    def _applying(self) -> list[Subject]:
+        """Subjects of this run: those of its kind, then those of its scenario's sections."""
+        of_sections = (
+            load_object(section.report)
+            for _, section in sections_of(self.scenario) if section.report
+        )  # fmt: skip
+        subjects = [*self.subjects, *chain.from_iterable(of_sections)]
+        return [subject for subject in subjects if subject.applies(self)]
 
     def ending(self) -> dict[str, Any]:
         """How it ended, as summaries have it."""
@@ -371,13 +395,8 @@ class Run(Result):
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """What draws it, by the names of files without ending; the first is the most telling."""
         drawn = self.main_figures()
-        for section in self.sections:
-            if section.figures is None or not section.applies(self):
-                continue
-            if callable(section.figures):
-                drawn |= section.figures(self)
-            else:
-                drawn |= {name: partial(draw, self) for name, draw in section.figures.items()}
+        for subject in self._applying():
+            drawn |= subject.drawn(self)
         return drawn
 
     @cached_property

@@ -20,7 +20,7 @@ from cdpr_drake.analyses.frame.figures import (
     spread,
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
-from cdpr_drake.analyses.runs.run import Run, Section
+from cdpr_drake.analyses.runs.run import Run, Subject
 from cdpr_drake.analyses.visualization.cable_figures import draw_cables
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.poses import pose_row, pose_rows_distance
@@ -265,15 +265,17 @@ def _has(name: str) -> Callable[[Run], bool]:
     return lambda run: getattr(run.scenario.sensors, name) not in (None, [], ())
 
 
-PAN_TILT = Section(
-    "pan_tilt", lambda run: run.scenario.camera.pan_tilt is not None, pan_tilt_numbers,
+PAN_TILT = Subject(
+    "pan_tilt",
+    pan_tilt_numbers,
     {"camera_joints": camera_joints_figure},
-)  # fmt: skip
+    applies=lambda run: run.scenario.camera.pan_tilt is not None,
+)
 SENSING = (
-    Section("", _has("log"), figures={"readings": reading_figure}),
-    Section("", _has("range_sensors"), figures=range_figures),
-    Section("", _has("imu"), figures={"imu": imu_figure}),
-    Section("", _has("depth"), figures={"depth": depth_figure}),
-    Section("", _has("pan_tilt"), figures={"pan_tilt": head_figure}),
-    Section("", _has("odometry"), figures={"odometry": odometry_figure}),
+    Subject("", figures={"readings": reading_figure}, applies=_has("log")),
+    Subject("", figures=range_figures, applies=_has("range_sensors")),
+    Subject("", figures={"imu": imu_figure}, applies=_has("imu")),
+    Subject("", figures={"depth": depth_figure}, applies=_has("depth")),
+    Subject("", figures={"pan_tilt": head_figure}, applies=_has("pan_tilt")),
+    Subject("", figures={"odometry": odometry_figure}, applies=_has("odometry")),
 )

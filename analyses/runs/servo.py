@@ -15,7 +15,6 @@ from pydrake.systems.analysis import SimulatorStatus
 
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.thinning import by_pieces
-from cdpr_drake.analyses.runs import sections as subjects
 from cdpr_drake.analyses.runs import servo_figures as drawn
 from cdpr_drake.analyses.runs.adaptation import LEARNT_POINTS
 from cdpr_drake.analyses.runs.checks import (
@@ -32,6 +31,18 @@ from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.sensing import PAN_TILT, SENSING
 from cdpr_drake.analyses.runs.stability import STABILITY, Stability, stability_of_run
+from cdpr_drake.analyses.runs.subjects import (
+    BEHAVIOUR,
+    DISTURBANCES,
+    FAILURES,
+    MOTORS,
+    TENSION_GAIN,
+    WANTED_TENSIONS,
+    WORLD,
+    world_facts,
+    world_names,
+    world_numbers,
+)
 from cdpr_drake.analyses.runs.unexpected_end import servo_message
 from cdpr_drake.analyses.visualization.live_view import Prepare, live_servo
 from cdpr_drake.analyses.visualization.replay import write_replay
@@ -103,10 +114,9 @@ class TorqueSteps:
         }
 
 
-SECTIONS = (
-    subjects.MOTORS, subjects.WANTED_TENSIONS, subjects.BEHAVIOUR, *SENSING,
-    subjects.TENSION_GAIN, subjects.DISTURBANCES, subjects.FAILURES, subjects.WRENCH,
-    LEARNT_POINTS, PAN_TILT, subjects.WORLD, STABILITY,
+SUBJECTS = (
+    MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, DISTURBANCES, FAILURES,
+    LEARNT_POINTS, PAN_TILT, WORLD, STABILITY,
 )  # fmt: skip
 """Subjects of runs of visual servos, in the order of their numbers in a summary."""
 
@@ -126,7 +136,7 @@ class ServoRun(Run):
     """
 
     kind = VISUAL_SERVO
-    sections = SECTIONS
+    subjects = SUBJECTS
     broken = step_errors = depth_image = None
     images: tuple[int, int] | None = None
     torque: TorqueSteps | None = None
@@ -221,8 +231,8 @@ class ServoRun(Run):
                 tension_limits(self.scenario, built.robot),
             )  # fmt: skip
 
-    def log_names(self) -> dict[str, Sequence[str]]:
-        world = subjects.world_names(self.scenario.world)
+    def log_names(self) -> dict[str, Sequence[str] | str]:
+        world = world_names(self.scenario.world)
         return super().log_names() | {"error": self.built.feature_names} | world
 
     def end_error(self) -> tuple[float, float]:
@@ -344,7 +354,7 @@ class ServoRun(Run):
             "torque_control": self.torque
             and self.torque.numbers(scenario.torque_control or TorqueControl()),
             "simulated": simulated_model(built.robot, scenario.cables, scenario.damping),
-            "world": subjects.world_numbers(self),
+            "world": world_numbers(self),
             "surplus_over_chord_m": spread(log["surplus_lengths"].ravel()),
             "engine": engine_of(scenario),
             "loop": self.loop,
@@ -378,7 +388,7 @@ class ServoRun(Run):
         ]  # fmt: skip
         if (images := summary["images"]) is not None:
             facts.append(("images", f"{images['taken']}, of which {images['whole']} whole"))
-        facts += [*calibration_facts(summary["calibration"]), *subjects.world_facts(summary)]
+        facts += [*calibration_facts(summary["calibration"]), *world_facts(summary)]
         if (torque := summary["torque_control"]) is not None:
             instant, off = torque["taut_after_s"], torque["largest_excess_n"]
             words = "never all taut" if instant is None else f"all taut after {instant:.2f} s"

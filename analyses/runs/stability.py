@@ -15,7 +15,7 @@ from cdpr_drake.analyses.frame.figures import (
     new_figure,
     shade,
 )
-from cdpr_drake.analyses.runs.run import Run, Section
+from cdpr_drake.analyses.runs.run import Run, Subject
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_from_row
@@ -25,7 +25,7 @@ from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
 from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_ENCODERS, LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of, servo_criterion
-from cdpr_drake.systems.monitoring.stability_watch import ServoCriterion
+from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 
 MOST_ROWS = 2000
@@ -177,4 +177,6 @@ def _figure(run: Any) -> Figure:
     return stability_figure(title, run.stability)
 
 
-STABILITY = Section("", lambda run: run.stability is not None, figures={"stability": _figure})
+STABILITY = Subject(
+    "", figures={"stability": _figure}, applies=lambda run: run.stability is not None
+)

@@ -24,7 +24,7 @@ from cdpr_drake.analyses.runs.checks import (
 from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine, resting
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
-from cdpr_drake.analyses.runs.sections import (
+from cdpr_drake.analyses.runs.subjects import (
     FORCES,
     PROGRAM_STEPS,
     WORLD,
@@ -72,7 +72,7 @@ class TensionRun(Run):
     """
 
     kind = TENSION_CONTROL
-    sections = (FORCES, PROGRAM_STEPS, WORLD)
+    subjects = (FORCES, PROGRAM_STEPS, WORLD)
     loop: str | None = None
 
     @cached_property
@@ -171,7 +171,7 @@ class TensionRun(Run):
         over = time >= self.scenario.duration * (1.0 - 1e-12)
         return Outcome.COMPLETED if over else Outcome.RUNNING
 
-    def log_names(self) -> dict[str, Sequence[str]]:
+    def log_names(self) -> dict[str, Sequence[str] | str]:
         return super().log_names() | world_names(self.scenario.world)
 
     def end_error(self) -> tuple[float, float]:

@@ -406,8 +406,8 @@ def _setting(field: dataclasses.Field[Any], hint: Any) -> Setting:
 
 
 Refusal = tuple[str, object, str]
-"""A key within a section, or empty; what was found there, in words; and what is accepted, or empty
-where the words tell that, too."""
+"""A key within a section, empty for itself, or after a / a key of the whole file; what was found
+there, in words; and what is accepted, or empty where the words tell that, too."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -339,8 +339,9 @@ class _Problems:
         for place, refusals in asked:
             try:
                 for key, found, accepted in refusals(scope):
-                    parts = re.findall(r"[^.\[\]]+", key)
-                    at = (*place, *(int(part) if part.isdecimal() else part for part in parts))
+                    parts = re.findall(r"[^.\[\]/]+", key)
+                    at = within if key.startswith("/") else place
+                    at = (*at, *(int(part) if part.isdecimal() else part for part in parts))
                     self.add(at, f"found {found}; accepted: {accepted}" if accepted else str(found))
             except self._error as problem:  # of a file that a section names
                 for words in problem.problems:

@@ -23,7 +23,7 @@ from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.estimators.geometry_learner import BELIEVED_POINTS, GeometryLearner
 from cdpr_drake.systems.estimators.recursive_calibration import RecursiveCalibration
 from cdpr_drake.systems.monitoring.belief_check import BeliefCheck
-from cdpr_drake.systems.monitoring.stability_watch import ServoCriterion
+from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings

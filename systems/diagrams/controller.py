@@ -115,18 +115,12 @@ def _partition(settings: VisualServoSettings, pinhole: Pinhole) -> AxisPartition
 
 
 def scheme_refusals(settings: Scenario, robot: Robot, target: Target) -> Iterator[Refusal]:
-    """What `partitioned` and `switching` cannot do.
+    """What `partitioned` cannot do.
 
-    That is a criterion of stability, which knows neither; of `partitioned` a planar robot, which
-    cannot move along an axis and across it at will, and points that a field pushes from where they
-    are desired.
+    That is a planar robot, which cannot move along an axis and across it at will, and points that a
+    field pushes from where they are desired.
     """
     c = settings.controller
-    if c.scheme in ("partitioned", "switching") and settings.stability is not None:
-        found = (
-            f"a section with controller.scheme {c.scheme}, whose law the criterion does not know"
-        )
-        yield "stability", found, "null, or pbvs, pbvs-line, 2.5d, ibvs, circles"
     if c.scheme != "partitioned":
         return
     if robot.motion_type().is_horizontal_body:

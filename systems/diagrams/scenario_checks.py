@@ -31,7 +31,6 @@ from cdpr_drake.systems.diagrams.torque_control import (
     torque_refusals,
     winch_group_refusals,
 )
-from cdpr_drake.systems.diagrams.wrench_estimation import wrench_refusals
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
 from cdpr_drake.systems.remote.settings import servo_place_refusals
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
@@ -265,7 +264,6 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     adaptation_refusals,
     _cables,
     emergency_refusals,
-    wrench_refusals,
     _winches,
     winch_group_refusals,
     torque_refusals,

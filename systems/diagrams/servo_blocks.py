@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator, MatrixGain
@@ -28,13 +28,12 @@ from cdpr_drake.systems.diagrams.torque_control import (
     add_torque_controller,
     connect_torque_controller,
 )
-from cdpr_drake.systems.diagrams.wrench_estimation import add_wrench_estimator
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.estimators.geometry_learner import GeometryLearner
-from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimator
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 
 
@@ -53,9 +52,10 @@ class VisualServoBlocks(ServoModel):
             None for others.
         corrector: Takes up slack; None unless asked for.
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
-        wrench: Estimates what pushes the platform; None unless asked for.
         learner: Learns exit and anchor points; None unless asked for.
         turning: The joints of a camera that turns, and what turns them; None: it is fixed.
+        prefix: What the names of the blocks begin with.
+        logged: What sections log, by the names of the quantities.
     """
 
     block: RobotBlock
@@ -67,9 +67,10 @@ class VisualServoBlocks(ServoModel):
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
     torque: TorqueController | None = None
-    wrench: WrenchEstimator | None = None
     learner: GeometryLearner | None = None
     turning: TurningCamera | None = None
+    prefix: str = ""
+    logged: dict[str, OutputPort] = field(default_factory=dict)
 
     @property
     def sight(self) -> System:
@@ -183,8 +184,8 @@ def add_visual_servo(
             builder, torque, robot, readings=readings, servo=servo, estimator=estimator
         )
     velocities = _run_off(builder, velocities, winch_offsets(settings, velocities.size()), prefix)
-    return VisualServoBlocks(
-        **{field.name: getattr(model, field.name) for field in fields(model)},
+    blocks = VisualServoBlocks(
+        **{each.name: getattr(model, each.name) for each in fields(model)},
         block=robot,
         measurement=measurement,
         servo=servo,
@@ -195,14 +196,6 @@ def add_visual_servo(
         corrector=corrector,
         torque=torque,
         turning=turning,
-        wrench=add_wrench_estimator(
-            builder,
-            settings,
-            robot,
-            believed=model.believed,
-            readings=readings,
-            name=prefix + "wrench_estimator",
-        ),
         learner=add_geometry_learner(
             builder,
             settings,
@@ -214,7 +207,11 @@ def add_visual_servo(
             estimated=estimator.GetOutputPort("X_WP"),
             name=prefix + "geometry_learner",
         ),
+        prefix=prefix,
     )
+    for _, section in sections_of(settings):
+        blocks.logged.update(section.add_to(builder, blocks, settings))
+    return blocks
 
 
 def seen_ports(

@@ -26,6 +26,7 @@ from cdpr_drake.systems.diagrams.fusion_models import fusion_task
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorTask
 from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.trajectories.pose_trajectory import MovingPose, PoseTrajectory
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
@@ -108,6 +109,10 @@ class ServoModel:
             goals = [task.desired.transform() for task in settings.tasks()]
             way = settings.pose_plan.plan()
             return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
+        for _, section in sections_of(settings):
+            servo: FeatureServo | None = section.make_servo(self, settings)
+            if servo is not None:
+                return servo
         if settings.adaptation is not None:
             return AdaptiveServo(controller, target, pinhole, rate)
         return FeatureServo(controller, target, pinhole, rate)

@@ -23,18 +23,9 @@ from cdpr_drake.systems.estimators.geometry_learner import (
     LEARNT_SIGMA,
     OPEN_FRAMES,
 )
-from cdpr_drake.systems.estimators.wrench_estimator import (
-    WRENCH_ESTIMATED,
-    WRENCH_SIGMA,
-    WRENCH_SKIPPED,
-)
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
-from cdpr_drake.systems.monitoring.stability_watch import (
-    ServoCriterion,
-    StabilitySettings,
-    StabilityWatch,
-)
+from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
 from cdpr_drake.systems.robots.failures import FAULTS
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
@@ -185,40 +176,10 @@ def servo_criterion(model: ServoModel, cables: CableSet, pulleys: bool) -> Servo
     )
 
 
-def add_stability_watch(
-    builder: DiagramBuilder,
-    blocks: VisualServoBlocks,
-    settings: StabilitySettings,
-    *,
-    pulleys: bool = False,
-    name: str = "stability",
-) -> StabilityWatch:
-    """Adds a `StabilityWatch` to a servo, in somebody's builder.
-
-    Args:
-        builder: The builder that has the servo.
-        blocks: The servo.
-        settings: From which tension a cable counts.
-        pulleys: Whether its controller reckons with pulleys.
-        name: Of the block.
-    """
-    watch = StabilityWatch(criterion_of(blocks, pulleys), settings.threshold)
-    builder.AddNamedSystem(name, watch)
-    for port, source in (
-        ("X_WP", blocks.block.GetOutputPort("X_WP")),
-        ("X_WP_estimated", blocks.estimator.GetOutputPort("X_WP")),
-        ("tensions", blocks.block.GetOutputPort("tensions")),
-        ("slack", blocks.block.GetOutputPort("slack")),
-    ):
-        builder.Connect(source, watch.GetInputPort(port))
-    return watch
-
-
 def add_servo_log(
     builder: DiagramBuilder,
     scenario: Scenario,
     blocks: VisualServoBlocks,
-    stability: StabilityWatch | None,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
     *,
@@ -246,9 +207,6 @@ def add_servo_log(
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
-    if blocks.wrench is not None:
-        for name in (WRENCH_ESTIMATED, WRENCH_SIGMA, WRENCH_SKIPPED):
-            ports[name] = blocks.wrench.GetOutputPort(name)
     if blocks.learner is not None:
         for name in (LEARNT, LEARNT_SIGMA, BELIEVED_POINTS, ADAPTATION, DOUBTED, OPEN_FRAMES):
             ports[name] = blocks.learner.GetOutputPort(name)
@@ -264,9 +222,6 @@ def add_servo_log(
     if blocks.corrector is not None:
         for name in ("tension_corrections", "tension_thresholds"):
             ports[name] = blocks.corrector.GetOutputPort(name)
-    if stability is not None:
-        for name in ("taut_cables", "jacobian_rank", "stability_margin"):
-            ports[name] = stability.GetOutputPort(name)
     if meters is not None:
         ports |= meters.logged()
     if blocks.torque is not None:
@@ -276,4 +231,5 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    return add_log(builder, ports | looking.logged | dict(reacting), scenario.log_rate)
+    ports |= looking.logged | dict(reacting) | blocks.logged
+    return add_log(builder, ports, scenario.log_rate)

@@ -90,12 +90,9 @@ def winch_group_refusals(scope: Scope) -> Iterator[Refusal]:
     if groups.count < motions:
         found = f"{name} with {groups.count} winches for {len(robot.cables)} cables"
         yield "robot", found, f"at least {motions} for a visual servo, one for each motion"
-    for key, why in (
-        ("tension_management", "which takes up slack cable by cable"),
-        ("stability", "whose criterion takes each cable to have a winch of its own"),
-    ):
-        if getattr(scenario, key) is not None:
-            yield key, f"a section, {why}", f"null for {name}"
+    if scenario.tension_management is not None:
+        found = "a section, which takes up slack cable by cable"
+        yield "tension_management", found, f"null for {name}"
     integrator = scenario.integration.integrator
     if scenario.winches.has_motors() and integrator == SEMI_IMPLICIT:
         found = f"{integrator} with motors that have several cables each"

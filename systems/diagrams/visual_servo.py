@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -23,7 +22,6 @@ from cdpr_drake.systems.diagrams.servo_watches import (
     LOGGED_OF_CABLES,
     add_servo_log,
     add_servo_watches,
-    add_stability_watch,
 )
 from cdpr_drake.systems.monitoring.log_row import RunLog
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor
@@ -47,17 +45,6 @@ WATCH_PERIOD = 1e-3
 looked at once a step, which is about as long."""
 
 
-@runtime_checkable
-class Addition(Protocol):
-    """A section of a scenario that adds blocks of its own to a servo's diagram.
-
-    A scenario's class gets it as a field, as any section; nothing else has to know of it.
-    """
-
-    def add_to(self, builder: DiagramBuilder, blocks: VisualServoBlocks) -> None:
-        """Adds and connects its blocks, before the diagram is built."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class VisualServo(VisualServoBlocks):
     """A scenario's diagram and the handles that a run needs.
@@ -65,8 +52,8 @@ class VisualServo(VisualServoBlocks):
     Attributes:
         scenario: The scenario.
         diagram: The diagram; subsystems robot, camera, detector (whole rendered images only),
-            servo, estimator, monitor, stability (if asked for), wanted_lengths (winches by
-            position only); exported outputs of the same names as their ports.
+            servo, estimator, monitor, wanted_lengths (winches by position only),
+            those of sections; exported outputs of the same names as their ports.
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
@@ -165,22 +152,11 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder.AddNamedSystem("robot", block)
     blocks = add_visual_servo(builder, block, scenario)
     watches = add_servo_watches(builder, scenario, blocks, world)
-    for field in fields(scenario):
-        section = getattr(scenario, field.name)
-        if isinstance(section, Addition):
-            section.add_to(builder, blocks)
-    stability = None
-    if scenario.stability is not None:
-        stability = add_stability_watch(
-            builder, blocks, scenario.stability, pulleys=scenario.controller.pulleys
-        )
     looking = add_perception_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
     reacting = add_emergency(builder, scenario, blocks)
-    log = add_servo_log(
-        builder, scenario, blocks, stability, looking, watches.meters, reacting=reacting
-    )
+    log = add_servo_log(builder, scenario, blocks, looking, watches.meters, reacting=reacting)
     for event in () if scenario.failures is None else scenario.failures.of_sensors():
         assert event.sensor is not None
         late = event.delay if event.kind == LATE else None

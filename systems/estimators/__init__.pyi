@@ -7,5 +7,3 @@ from .pose_estimator import PoseEstimator as PoseEstimator
 from .pose_estimator import Read as Read
 from .recursive_calibration import Learnt as Learnt
 from .recursive_calibration import RecursiveCalibration as RecursiveCalibration
-from .wrench_estimator import WrenchEstimation as WrenchEstimation
-from .wrench_estimator import WrenchEstimator as WrenchEstimator

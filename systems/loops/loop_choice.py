@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from cdpr_drake.errors import ScenarioError
@@ -10,7 +10,6 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.cameras.camera_settings import PROJECTED
 from cdpr_drake.systems.controllers.tension_management_settings import IMAGE
 from cdpr_drake.systems.diagrams.servo_models import servo_model
-from cdpr_drake.systems.diagrams.visual_servo import Addition
 from cdpr_drake.systems.loops.basis import loop_basis
 from cdpr_drake.systems.loops.parts import checked_estimator, checked_sensor
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, PLANT
@@ -22,6 +21,7 @@ from cdpr_drake.systems.scenarios.run_settings import (
     set_engine,
 )
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 
 
@@ -58,8 +58,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its disturbances are a block of a diagram"
     if scenario.failures is not None:
         return "its failures are a block of a diagram"
-    if scenario.wrench_estimation is not None:
-        return "its estimate of wrenches is a block of a diagram"
     if scenario.adaptation is not None:
         return "what learns its points is a block of a diagram"
     if scenario.integration.engine == PLANT:
@@ -74,18 +72,14 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its plan of poses is a block of a diagram"
     if scenario.sensors.looks_round():
         return "its sensors look at a scene"
-    if scenario.stability is not None:
-        return "it follows the stability criterion along the run"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
     if scenario.tension_management is not None and scenario.tension_management.kind == IMAGE:
         return "a camera looks at the cables"
     if scenario.winches.mode != "velocity":
         return f"its winches are commanded by {scenario.winches.mode}"
-    for field in fields(scenario):
-        # Of classes, since what a class is of a protocol is kept, what an object is is not.
-        if issubclass(type(getattr(scenario, field.name)), Addition):
-            return f"its section {field.name} adds blocks"
+    for key, _ in sections_of(scenario):
+        return f"its section {key} adds blocks to a diagram"
     robot = loop_basis(scenario).robot
     if robot.knows_breaking_loads():
         return f"the cables of {robot.name} are watched for breaking"

@@ -11,7 +11,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.estimators.geometry_learner import Offer
-from cdpr_drake.systems.monitoring.stability_watch import ServoCriterion
+from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 
 
 @dataclass(frozen=True, eq=False)

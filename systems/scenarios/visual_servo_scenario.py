@@ -23,8 +23,6 @@ from cdpr_drake.systems.controllers.tension_management_settings import TensionMa
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
 from cdpr_drake.systems.estimators.geometry_learner import Adaptation
-from cdpr_drake.systems.estimators.wrench_estimator import WrenchEstimation
-from cdpr_drake.systems.monitoring.stability_watch import StabilitySettings
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
@@ -33,10 +31,12 @@ from cdpr_drake.systems.scenarios.run_settings import (
     ScenarioHeader,
     StopSettings,
 )
+from cdpr_drake.systems.sections import with_sections
 from cdpr_drake.systems.sensors.sensor_settings import SensorSuite
 
 
 @settings
+@with_sections("visual_servo")
 class VisualServoSettings:
     """A visual servo on a robot: camera, target, law, estimator, sensors and model errors."""
 
@@ -67,10 +67,6 @@ class VisualServoSettings:
     tension_management: Annotated[
         TensionManagement | None,
         "What takes up slack beside the servo; null: nobody looks after the tensions.",
-    ] = None
-    wrench_estimation: Annotated[
-        WrenchEstimation | None,
-        "An estimate of what pushes the platform, which is logged; null: none.",
     ] = None
     adaptation: Annotated[
         Adaptation | None,
@@ -106,10 +102,6 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     kind: Annotated[str, OneOf((VISUAL_SERVO,)), "Kind of run."] = VISUAL_SERVO
     stop: Annotated[StopSettings, "When the run ends."]
     integration: Annotated[IntegrationSettings, "Integration."] = filled(IntegrationSettings)
-    stability: Annotated[
-        StabilitySettings | None,
-        "The stability criterion along the run, in its log; null: not logged.",
-    ] = None
     emergency: Annotated[
         EmergencySettings | None,
         "What is done when a cable has broken, beside section failures; null: nothing.",

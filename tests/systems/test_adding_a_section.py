@@ -1,6 +1,6 @@
 """A section of a scenario, as CONTRIBUTING.md says; other toys are in tests/recipes."""
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import pytest
 from pydrake.systems.framework import LeafSystem
@@ -10,17 +10,21 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sections import Section
 
 QUICK = ["camera.kind=projected", "duration=0.2"]
 
 
 @settings
-class Counter:
+class Counter(Section):
     """Counts, at its own rate: a toy of a section that brings a block."""
+
+    words = "A counter"
+    columns: ClassVar = {"count": ("counts",)}
 
     rate: Annotated[float, In("Hz", gt=0.0), "Counts per second."] = 10.0
 
-    def add_to(self, builder, blocks):
+    def add_to(self, builder, blocks, settings):
         """Adds the block beside the servo."""
 
         class Count(LeafSystem):
@@ -36,7 +40,8 @@ class Counter:
                 )
                 self.DeclareStateOutputPort("count", state)
 
-        builder.AddNamedSystem("counter", Count(self.rate))
+        counter = builder.AddNamedSystem("counter", Count(self.rate))
+        return {"count": counter.GetOutputPort("count")}
 
 
 @settings
@@ -52,5 +57,6 @@ def test_a_scenario_section():
     counter = result.built.diagram.GetSubsystemByName("counter")
     assert result.built.scenario.counter.rate == 100.0
     assert counter.GetOutputPort("count").size() == 1
+    assert result.columns()["count.counts"][-1] == 20.0
     with pytest.raises(ScenarioError, match="counter"):
         load_scenario("acrobot_pbvs", overrides)

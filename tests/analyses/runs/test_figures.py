@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.analyses.runs import sections, servo_figures
+from cdpr_drake.analyses.runs import servo_figures, subjects
 from cdpr_drake.analyses.runs.adaptation import (
     LEARNT_POINTS,
     adaptation_numbers,
@@ -60,9 +60,9 @@ SHORT = ("camera.kind=projected", "integration.engine=compiled")
 
 
 def drawn_of(run, *subjects):
-    """Figures of sections of a run, by name."""
-    run.sections, run.main_figures = subjects, dict
-    return ServoRun.figures(run)
+    """Figures of subjects of a run, by name."""
+    applying = [subject for subject in subjects if subject.applies(run)]
+    return {name: draw for subject in applying for name, draw in subject.drawn(run).items()}
 
 
 def by_hand(log, **more):
@@ -172,7 +172,7 @@ def test_errors_of_readings_are_those_at_the_instant_of_the_reading():
     sensors = ServoRun(
         load_scenario("acrobot_sensors", [*SHORT, "duration=0.6", "winches.kind=motor"])
     ).simulate()
-    figures = drawn_of(sensors, sections.MOTORS, *SENSING)
+    figures = drawn_of(sensors, subjects.MOTORS, *SENSING)
     assert list(figures) == ["motor_torques", "readings"]
     figure = figures["readings"]()
     panels = {axes.get_ylabel().split(",")[0]: axes for axes in figure.axes}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.runs.sections import BEHAVIOUR, loop_figure
+from cdpr_drake.analyses.runs.subjects import BEHAVIOUR, loop_figure
 from cdpr_drake.cables.cable_behaviour import tension_of_strain
 from cdpr_drake.cables.models import check_model
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis

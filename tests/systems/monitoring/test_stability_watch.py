@@ -21,11 +21,11 @@ from cdpr_drake.analyses.runs.stability import (
 )
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.sections.stability.section import StabilityWatch
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.pan_tilt import turned_mounting
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.monitoring.stability_watch import StabilityWatch
 from tests.messages import printed
 
 SAME = 1e-9  # two ways to the same margin differ by rounding of the logged quaternions only [-]

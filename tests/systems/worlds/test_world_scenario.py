@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from pydrake.geometry import Role
 
-from cdpr_drake.analyses.runs.sections import world_facts
 from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.subjects import world_facts
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.templates import file_schema
 from cdpr_drake.analyses.visualization.replay import RobotPicture

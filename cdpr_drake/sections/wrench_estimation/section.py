@@ -1,22 +1,32 @@
-"""Scenario section `wrench_estimation`, and its block: what pushes, by tensions and lengths.
+"""Section `wrench_estimation` of a scenario, and its block: what pushes, by tensions and lengths.
 
 Lengths, stretched by tensions, tell the pose (forward kinematics from the pose before), and that
 and tensions the wrench, by one of `estimation.wrench_observers.OBSERVERS`, which says what each is
 worth.
 """
 
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    LeafSystem,
+    OutputPort,
+)
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.cables.models import CABLE_MODELS
 from cdpr_drake.errors import CableGeometryError, ForwardKinematicsError
 from cdpr_drake.estimation.wrench_observer_kernel import MEMORY_SIZE
 from cdpr_drake.estimation.wrench_observers import (
     MOMENTUM,
     OBSERVERS,
+    ObserverResponse,
     WrenchError,
     WrenchObserver,
     observer_response,
@@ -26,24 +36,36 @@ from cdpr_drake.estimation.wrench_observers import (
 )
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Refusal, Scope, settings
 from cdpr_drake.statics.forward_kinematics import ForwardKinematics, tautest_cables
 from cdpr_drake.statics.rigid_platform import RigidPlatform
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
+from cdpr_drake.systems.sections import Section
+from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
 
-WRENCH_ESTIMATED, WRENCH_SIGMA = "wrench_estimated", "wrench_sigma"
+ESTIMATED, SIGMA = "wrench_estimated", "wrench_sigma"
 """Outputs: the estimate, and the standard deviation of each of its components."""
 
-WRENCH_SKIPPED = "wrench_skipped"
+SKIPPED = "wrench_skipped"
 """Output: how many samples so far fitted no pose, and in how many a cable had no direction."""
+
+PARTS = ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n")
+"""Names of the components of a wrench in the log."""
 
 MISFIT = 0.02
 """Lengths that fit a pose this badly [m] tell none: the pose before stays."""
 
 
 @settings
-class WrenchEstimation:
+class WrenchEstimation(Section):
     """An estimate of what pushes the platform beside its cables and its weight."""
+
+    words = "An estimate of what pushes the platform, which is logged"
+    columns: ClassVar = {ESTIMATED: PARTS, SIGMA: PARTS, SKIPPED: ("no_pose", "no_direction")}
+    report = "cdpr_drake.sections.wrench_estimation.report:SUBJECTS"
 
     kind: Annotated[
         str,
@@ -80,6 +102,62 @@ class WrenchEstimation:
         """Share of a tension that pulleys are believed to take."""
         given = self.believed_pulley_friction
         return self.pulley_friction if given is None else given
+
+    def response(self) -> ObserverResponse:
+        """How the estimate follows a wrench."""
+        return observer_response(self.kind, 2.0 * np.pi * self.bandwidth, 1.0 / self.rate)
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Robots of which cables and lengths do not tell all of a wrench."""
+        robot = scope.robot
+        if not robot.motion_type().is_free or len(robot.cables) < 6:
+            found = f"a section for {robot.name}, {robot.motion} with {len(robot.cables)} cables"
+            yield "", found, "3R3T with at least 6"
+        model = scope.whole.cables.model_of(robot)
+        if CABLE_MODELS[model].sags:
+            accepted = "cables that do not sag, whose lengths and tensions tell the pose"
+            yield "", f"a section with cables.model {model}", accepted
+
+    def add_to(
+        self, builder: DiagramBuilder, blocks: Any, settings: Any
+    ) -> Mapping[str, OutputPort]:
+        """Adds a `WrenchEstimator`; platform and cables are as believed."""
+        robot, believed = blocks.block, blocks.believed
+        file = settings.perturbations.believed_robot
+        base = robot.robot if file is None else load_robot(file)
+        cables = believed.cables
+        if not robot.forces.cable_set().has_pulleys():
+            cables = cables.without_pulleys()
+        if file is None:
+            cables = replace(cables, stiffness=robot.forces.cable_set().stiffness)
+        block = WrenchEstimator(
+            self, EncoderLengths(cables, elastic=True), rigid_platform(base), believed.X_WP0,
+            reading_error(settings.sensors, robot.robot, self.believed_share()),
+        )  # fmt: skip
+        builder.AddNamedSystem(blocks.prefix + "wrench_estimator", block)
+        for port in ("measured_tensions", "measured_lengths"):
+            builder.Connect(blocks.readings.port(port), block.GetInputPort(port))
+        return {name: block.GetOutputPort(name) for name in self.columns}
+
+
+def reading_error(sensors: SensorSettings, robot: Robot, friction: float) -> WrenchError:
+    """What the readings of a robot's sensors err by.
+
+    Args:
+        sensors: The section.
+        robot: The robot.
+        friction: Share of a tension that pulleys before the sensors take.
+    """
+    noise = offset = length = 0.0
+    if sensors.rate("tension") is not None:
+        model = sensors.model("tension")
+        noise = float(np.hypot(model.repeatability, model.resolution / np.sqrt(12.0)))
+        offset = float(model.accuracy / np.sqrt(3.0))
+    if sensors.rate("encoder") is not None:
+        turn = 2.0 * np.pi / sensors.model("encoder").counts_per_turn
+        radius = float(np.mean(robot.drum().radii(len(robot.cables))))
+        length = turn * radius / np.sqrt(12.0)
+    return WrenchError(noise=noise, offset=offset, friction=friction, length=length)
 
 
 class WrenchEstimator(LeafSystem):
@@ -123,7 +201,7 @@ class WrenchEstimator(LeafSystem):
         body = packed_body(platform.mass, platform.p_PCo, platform.I_PPo, platform.acceleration())
         omega = 2.0 * np.pi * settings.bandwidth
         self._observer = WrenchObserver(settings.kind, body, omega, self.period)
-        self._response = observer_response(settings.kind, omega, self.period)
+        self._response = settings.response()
         self._error = error
         self._tensions = self.DeclareVectorInputPort("measured_tensions", m).Eval
         self._lengths = self.DeclareVectorInputPort("measured_lengths", m).Eval
@@ -136,14 +214,9 @@ class WrenchEstimator(LeafSystem):
         self._skipped = self.DeclareDiscreteState(2)
         self.DeclarePeriodicDiscreteUpdateEvent(self.period, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
-        self.DeclareStateOutputPort(WRENCH_ESTIMATED, self._found)
-        self.DeclareStateOutputPort(WRENCH_SIGMA, self._sigma)
-        self.DeclareStateOutputPort(WRENCH_SKIPPED, self._skipped)
-
-    @property
-    def delay(self) -> float:
-        """By how much a slow wrench is shown late [s]."""
-        return self._response.delay
+        self.DeclareStateOutputPort(ESTIMATED, self._found)
+        self.DeclareStateOutputPort(SIGMA, self._sigma)
+        self.DeclareStateOutputPort(SKIPPED, self._skipped)
 
     def _update(self, context: Context, state: DiscreteValues) -> None:
         def kept(index: int) -> Array:

@@ -1,6 +1,6 @@
 """Subjects of runs of robots: the numbers and the figures of each stand side by side.
 
-A `Section` row at the end of a subject lists them; see `Run.sections`.
+A `Subject` row at the end of each lists them; see `Run.subjects`.
 """
 
 from __future__ import annotations
@@ -22,25 +22,23 @@ from cdpr_drake.analyses.frame.figures import (
     shade,
 )
 from cdpr_drake.analyses.frame.thinning import path_rows
-from cdpr_drake.analyses.runs.run import Run, Section
+from cdpr_drake.analyses.runs.run import Run, Subject
 from cdpr_drake.analyses.visualization.cable_figures import draw_cables
 from cdpr_drake.arrays import Array
 from cdpr_drake.control.force_laws import port_energy
 from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.geometry.poses import pose_rows_distance, rotation_from_angles
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.palette import BOUND, DESIRED, DISTANCE, ESTIMATED, IDEAL, PLATFORM, nth_look
+from cdpr_drake.palette import BOUND, DESIRED, DISTANCE, ESTIMATED, PLATFORM, nth_look
 from cdpr_drake.systems.controllers.force_tracking import HYBRID
 from cdpr_drake.systems.diagrams.tension_management import used_gain
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.estimators.wrench_estimator import (
-    WRENCH_ESTIMATED,
-    WRENCH_SIGMA,
-    WRENCH_SKIPPED,
-)
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 from cdpr_drake.systems.worlds.settings import WorldSettings
+
+WRENCH_ESTIMATED = "wrench_estimated"
+"""Wrench on the platform in the log, as dynamic control estimates it [N m, N]."""
 
 CONTACT = "contact_force"
 """Force of contact on the platform in the log [N]."""
@@ -149,7 +147,9 @@ def world_figure(run: Run) -> Figure:
     return figure
 
 
-WORLD = Section("", lambda run: run.scenario.world is not None, figures={"world": world_figure})
+WORLD = Subject(
+    "", figures={"world": world_figure}, applies=lambda run: run.scenario.world is not None
+)
 
 
 # Forces on the platform in dynamic control
@@ -225,14 +225,17 @@ def _widen(panel: Axes, least: float) -> None:
         panel.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
 
 
-FORCES = Section(
-    "forces", lambda run: APPLIED_WRENCH in run.log or WRENCH_ESTIMATED in run.log,
-    force_numbers, {"forces": force_figure},
-)  # fmt: skip
-PROGRAM_STEPS = Section(
-    "program_steps", lambda run: run.built.blocks.distributor.step_times is not None,
+FORCES = Subject(
+    "forces",
+    force_numbers,
+    {"forces": force_figure},
+    applies=lambda run: APPLIED_WRENCH in run.log or WRENCH_ESTIMATED in run.log,
+)
+PROGRAM_STEPS = Subject(
+    "program_steps",
     lambda run: run.built.blocks.distributor.step_times.as_dict(),
-)  # fmt: skip
+    applies=lambda run: run.built.blocks.distributor.step_times is not None,
+)
 
 
 # What pushes and breaks in a visual servo
@@ -291,66 +294,13 @@ def _gain(run: Run) -> Any:
     return used_gain(scenario, settings, run.robot, run.built.believed, cables)
 
 
-TENSION_GAIN = Section("tension_gain", lambda run: _gain(run) is not None, gain_numbers)
-DISTURBANCES = Section("disturbances", lambda run: APPLIED_WRENCH in run.log, disturbance_numbers)
-FAILURES = Section("failures", lambda run: run.scenario.failures is not None, failure_numbers)
-
-
-# The estimate of the wrench on the platform
-
-WRENCH_PARTS = (("force", "n", slice(3, 6)), ("moment", "nm", slice(0, 3)))
-"""Force and moment of a spatial force, and their units in keys."""
-
-
-def true_wrench(log: Mapping[str, Array]) -> Array:
-    """Wrench of the section `disturbances` on the platform, shape (n, 6) [N m, N]; else zeros."""
-    if APPLIED_WRENCH in log:
-        return np.asarray(log[APPLIED_WRENCH])
-    return np.zeros_like(log[WRENCH_ESTIMATED])
-
-
-def wrench_numbers(run: Run) -> dict[str, Any]:
-    """Errors of the estimate against the true wrench, which is delayed as the estimate is."""
-    log, delay, time = run.log, run.built.wrench.delay, run.log["time"]
-    true = np.column_stack([np.interp(time - delay, time, row) for row in true_wrench(log).T])
-    errors = np.asarray(log[WRENCH_ESTIMATED]) - true
-    no_pose, no_direction = (int(x) for x in log[WRENCH_SKIPPED][-1])
-    numbers: dict[str, Any] = {
-        "kind": run.scenario.wrench_estimation.kind, "delay_s": delay,
-        "samples_without_pose": no_pose, "samples_without_direction": no_direction,
-    }  # fmt: skip
-    for name, unit, part in WRENCH_PARTS:
-        rms = np.sqrt(np.mean(np.sum(errors[:, part] ** 2, axis=1)))
-        numbers[f"{name}_rms_{unit}"] = float(rms)
-        numbers[f"{name}_bias_{unit}"] = np.mean(errors[:, part], axis=0).tolist()
-        numbers[f"{name}_sigma_{unit}"] = np.mean(log[WRENCH_SIGMA][:, part], axis=0).tolist()
-    return numbers
-
-
-def wrench_figure(run: Run) -> Figure:
-    """True and estimated force and moment over time, with three standard deviations of readings."""
-    time, estimate, sigma = (run.log[name] for name in ("time", WRENCH_ESTIMATED, WRENCH_SIGMA))
-    true = true_wrench(run.log)
-    title = run.title("What pushes the platform beside its cables, true and estimated")
-    figure, panels = new_figure(2, 3, (12.0, 6.4), title)
-    for row, (name, _, part) in enumerate(WRENCH_PARTS):
-        for k, axis in enumerate("xyz"):
-            panel, column = panels[row, k], part.start + k
-            low, high = (estimate[:, column] + s * 3.0 * sigma[:, column] for s in (-1.0, 1.0))
-            panel.fill_between(time, low, high, color="0.85", label="3 sigma of readings")
-            panel.plot(time, true[:, column], **line_style(IDEAL), label="that pushes")
-            panel.plot(time, estimate[:, column], **line_style(ESTIMATED), label="estimated")
-            panel.set(ylabel=f"force along {axis} [N]")
-            if name == "moment":
-                panel.set(xlabel="time [s]", ylabel=f"moment about {axis} [N m]")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    return figure
-
-
-WRENCH = Section(
-    "wrench_estimation", lambda run: WRENCH_ESTIMATED in run.log, wrench_numbers,
-    {"wrench": wrench_figure},
-)  # fmt: skip
+TENSION_GAIN = Subject("tension_gain", gain_numbers, applies=lambda run: _gain(run) is not None)
+DISTURBANCES = Subject(
+    "disturbances", disturbance_numbers, applies=lambda run: APPLIED_WRENCH in run.log
+)
+FAILURES = Subject(
+    "failures", failure_numbers, applies=lambda run: run.scenario.failures is not None
+)
 
 
 # Motors, goals of tensions, loops of cables and contacts
@@ -455,13 +405,16 @@ def _draw_loop(panel: Any, x: Array, y: Array, number: int, label: str) -> None:
     panel.plot(x[:1], y[:1], look.marker, color=look.color, markersize=7)
 
 
-MOTORS = Section(
-    "", lambda run: "applied_torques" in run.log, figures={"motor_torques": motor_figure}
+MOTORS = Subject(
+    "", figures={"motor_torques": motor_figure}, applies=lambda run: "applied_torques" in run.log
 )
-WANTED_TENSIONS = Section(
-    "", lambda run: "wanted_tensions" in run.log, figures={"tension_loop": tension_loop_figure}
+WANTED_TENSIONS = Subject(
+    "",
+    figures={"tension_loop": tension_loop_figure},
+    applies=lambda run: "wanted_tensions" in run.log,
 )
-BEHAVIOUR = Section(
-    "", lambda run: _stretches(run.robot) or run.robot.contact_hysteresis() is not None,
+BEHAVIOUR = Subject(
+    "",
     figures={"behaviour": loop_figure},
-)  # fmt: skip
+    applies=lambda run: _stretches(run.robot) or run.robot.contact_hysteresis() is not None,
+)

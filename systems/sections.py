@@ -1,0 +1,132 @@
+"""Sections of scenarios that hang on by a row: the core calls their hooks, and knows none by name.
+
+A section is a folder of `cdpr_drake.sections`, or of another package, with a class of settings
+that derives from `Section`. `SECTIONS` says where in a scenario each stands. Another package adds
+its own by an entry point of the group `cdpr_drake.sections`, with a name such as
+`visual_servo.my_section`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Annotated, Any, ClassVar
+
+from cdpr_drake.schema.declarations import Refusal, Scope
+
+SECTIONS = {
+    "visual_servo.wrench_estimation": (
+        "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
+    ),
+    "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
+}
+"""Module and class of each section, by the place of its key in scenarios."""
+
+GROUP = "cdpr_drake.sections"
+"""Entry points of other packages' sections."""
+
+_LOG = logging.getLogger(__name__)
+
+
+class Section:
+    """A section of a scenario: settings, which add blocks, columns of the log, numbers and figures.
+
+    A subclass is made a class of settings by `schema.declarations.settings`. It overrides the hooks
+    that it needs.
+
+    Attributes:
+        words: What the key of a scenario means.
+        columns: By the names of the quantities that it logs: what their numbers are called in
+            `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
+        report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
+    """
+
+    words: ClassVar[str]
+    columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
+    report: ClassVar[str] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What its settings cannot be together, or with robot and scenario; see `Scope`."""
+        return iter(())
+
+    def make_servo(self, model: Any, settings: Any) -> Any:
+        """A servo in the place of the law alone.
+
+        Args:
+            model: What the servo is about, a `ServoModel`.
+            settings: The scenario, or the `VisualServoSettings` of somebody's own diagram.
+
+        Returns:
+            A `FeatureServo`; None: the law alone, or what another section makes.
+        """
+        return None
+
+    def add_to(self, builder: Any, blocks: Any, settings: Any) -> Mapping[str, Any]:
+        """Adds its blocks to a visual servo.
+
+        Args:
+            builder: The DiagramBuilder that has the servo.
+            blocks: The servo's `VisualServoBlocks`.
+            settings: The scenario, or the `VisualServoSettings` of somebody's own diagram.
+
+        Returns:
+            Output ports that a run logs, by the names of the quantities.
+        """
+        return {}
+
+
+def sections_of(settings: Any) -> Iterator[tuple[str, Section]]:
+    """The sections that settings have, in the order of their fields, each with its key."""
+    for field in dataclasses.fields(settings):
+        value = getattr(settings, field.name)
+        if isinstance(value, Section):
+            yield field.name, value
+        elif dataclasses.is_dataclass(value):
+            for key, section in sections_of(value):
+                yield f"{field.name}.{key}", section
+
+
+def with_sections(place: str) -> Callable[[type], type]:
+    """Gives a class, before it is made settings, a field for each section of a place."""
+
+    def extended(kind: type) -> type:
+        for key, section in sections_at(place).items():
+            if hasattr(kind, key) or key in kind.__annotations__:
+                _LOG.warning("section %s.%s: left out: the key is taken", place, key)
+                continue
+            kind.__annotations__[key] = Annotated[section | None, f"{section.words}; null: none."]
+            setattr(kind, key, None)
+        return kind
+
+    return extended
+
+
+def sections_at(place: str) -> dict[str, type[Section]]:
+    """Classes of the sections of a place, by their keys.
+
+    Another package's section that cannot be imported is left out, with a warning.
+    """
+    classes = {}
+    foreign = {point.name: point.value for point in entry_points(group=GROUP)}
+    for name, target in {**foreign, **SECTIONS}.items():
+        where, _, key = name.rpartition(".")
+        if where != place:
+            continue
+        try:
+            section = load_object(target)
+        except Exception as problem:
+            if name in SECTIONS:
+                raise
+            _LOG.warning("entry point %s = %s: left out: %s", name, target, problem)
+            continue
+        classes[key] = section
+    return classes
+
+
+def load_object(target: str) -> Any:
+    """What stands at "package.module:name"."""
+    module, _, name = target.partition(":")
+    return getattr(import_module(module), name)
