@@ -15,15 +15,21 @@ from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Annotated, Any, ClassVar
 
-from cdpr_drake.schema.declarations import Refusal, Scope
+from cdpr_drake.schema.declarations import Refusal, Scope, filled
 
 SECTIONS = {
+    "camera.pan_tilt": "cdpr_drake.sections.pan_tilt.section:CameraPanTilt",
+    "sensors.pan_tilt": "cdpr_drake.sections.perception.section:PanTiltSettings",
+    "sensors.range_sensors": "cdpr_drake.sections.perception.section:RangeSettings",
+    "sensors.depth": "cdpr_drake.sections.perception.section:DepthSettings",
+    "sensors.odometry": "cdpr_drake.sections.perception.section:OdometrySettings",
     "visual_servo.wrench_estimation": (
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
 }
-"""Module and class of each section, by the place of its key in scenarios."""
+"""Module and class of each section, by the place of its key in scenarios; at a place, in the order
+in which they add their blocks."""
 
 GROUP = "cdpr_drake.sections"
 """Entry points of other packages' sections."""
@@ -41,11 +47,15 @@ class Section:
         words: What the key of a scenario means.
         columns: By the names of the quantities that it logs: what their numbers are called in
             `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
+        many: True if the key has a list of such sections, each of which adds its own.
+        needs_rendering: True if its blocks draw images, for which EGL is needed.
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
     """
 
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
+    many: ClassVar[bool] = False
+    needs_rendering: ClassVar[bool] = False
     report: ClassVar[str] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
@@ -77,16 +87,41 @@ class Section:
         """
         return {}
 
+    def log_columns(self) -> Mapping[str, Sequence[str] | str]:
+        """`columns`, or others by these settings, which a run asks for."""
+        return self.columns
+
+    def sampling_rate(self) -> float | None:
+        """How often it reads, by its field `rate` [Hz], at most once an integration step; None: it
+        does not say."""
+        return None
+
+    def at_end(self, built: Any, context: Any) -> Mapping[str, Any]:
+        """What only the diagram knows at the end of a run.
+
+        Args:
+            built: The `VisualServo`.
+            context: The diagram's context.
+
+        Returns:
+            What `Run.at_end` has for the section's report, by names.
+        """
+        return {}
+
 
 def sections_of(settings: Any) -> Iterator[tuple[str, Section]]:
     """The sections that settings have, in the order of their fields, each with its key."""
     for field in dataclasses.fields(settings):
         value = getattr(settings, field.name)
-        if isinstance(value, Section):
-            yield field.name, value
-        elif dataclasses.is_dataclass(value):
-            for key, section in sections_of(value):
-                yield f"{field.name}.{key}", section
+        items = {field.name: value}
+        if isinstance(value, list):
+            items = {f"{field.name}[{k}]": item for k, item in enumerate(value)}
+        for key, item in items.items():
+            if isinstance(item, Section):
+                yield key, item
+            elif dataclasses.is_dataclass(item):
+                for inside, section in sections_of(item):
+                    yield f"{key}.{inside}", section
 
 
 def with_sections(place: str) -> Callable[[type], type]:
@@ -97,8 +132,12 @@ def with_sections(place: str) -> Callable[[type], type]:
             if hasattr(kind, key) or key in kind.__annotations__:
                 _LOG.warning("section %s.%s: left out: the key is taken", place, key)
                 continue
-            kind.__annotations__[key] = Annotated[section | None, f"{section.words}; null: none."]
-            setattr(kind, key, None)
+            kind.__annotations__[key] = (
+                Annotated[list[section], section.words]  # type: ignore[valid-type]
+                if section.many
+                else Annotated[section | None, f"{section.words}; null: none."]
+            )
+            setattr(kind, key, filled(list) if section.many else None)
         return kind
 
     return extended

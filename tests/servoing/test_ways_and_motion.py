@@ -17,7 +17,7 @@ from cdpr_drake.servoing.turned_view import (
     spiral,
     steady_view,
 )
-from cdpr_drake.systems.sensors.pan_tilt import head_pose
+from cdpr_drake.sections.perception.head import head_pose
 from tests.servoing.servo_cases import PERIOD
 
 ROUND_OFF = 1e-12
