@@ -4,9 +4,10 @@
 section `sensors` that chooses their types.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydrake.systems.framework import System
 
@@ -174,15 +175,15 @@ class SensorSettings:
 
 
 class TypedSensor(Section):
-    """Base of sections for a sensor of a type of the catalogue, with fields `type` and `rate`.
+    """Base of sections for a sensor of a type of the catalogue, with fields `type` and `rate`."""
 
-    Attributes:
-        load: The type of a name, which has `rate_hz`, the most readings per second [Hz].
-    """
-
-    load: ClassVar[Callable[[str], Any]]
     type: str
     rate: float | None
+
+    @staticmethod
+    @abstractmethod
+    def load(name: str) -> Any:
+        """The type of a name, which has `rate_hz`, the most readings per second [Hz]."""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """A rate beyond that of the type."""
