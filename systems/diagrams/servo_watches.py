@@ -15,14 +15,6 @@ from cdpr_drake.systems.diagrams.pan_tilt import turning_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.estimators.geometry_learner import (
-    ADAPTATION,
-    BELIEVED_POINTS,
-    DOUBTED,
-    LEARNT,
-    LEARNT_SIGMA,
-    OPEN_FRAMES,
-)
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
@@ -207,9 +199,6 @@ def add_servo_log(
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
-    if blocks.learner is not None:
-        for name in (LEARNT, LEARNT_SIGMA, BELIEVED_POINTS, ADAPTATION, DOUBTED, OPEN_FRAMES):
-            ports[name] = blocks.learner.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:

@@ -22,7 +22,6 @@ from cdpr_drake.systems.controllers.servo_settings import (
 from cdpr_drake.systems.controllers.tension_management_settings import TensionManagement
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
-from cdpr_drake.systems.estimators.geometry_learner import Adaptation
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
@@ -67,11 +66,6 @@ class VisualServoSettings:
     tension_management: Annotated[
         TensionManagement | None,
         "What takes up slack beside the servo; null: nobody looks after the tensions.",
-    ] = None
-    adaptation: Annotated[
-        Adaptation | None,
-        "Exit and anchor points and lengths at the start, learnt while the servo runs; "
-        "null: what is believed at the start stays.",
     ] = None
     torque_control: Annotated[
         TorqueControl | None,
