@@ -21,7 +21,6 @@ from cdpr_drake.servoing.point_features import interaction_rank
 from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import make_tasks, scheme_refusals
-from cdpr_drake.systems.diagrams.emergency import emergency_refusals
 from cdpr_drake.systems.diagrams.fusion_checks import fusion_refusals
 from cdpr_drake.systems.diagrams.pan_tilt import pan_tilt_refusals
 from cdpr_drake.systems.diagrams.tension_management import management_refusals
@@ -261,7 +260,6 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     fusion_refusals,
     management_refusals,
     _cables,
-    emergency_refusals,
     _winches,
     winch_group_refusals,
     torque_refusals,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
@@ -174,8 +173,6 @@ def add_servo_log(
     blocks: VisualServoBlocks,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
-    *,
-    reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, servo, sight = blocks.block, blocks.servo, blocks.sight
@@ -220,5 +217,5 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    ports |= looking.logged | dict(reacting) | blocks.logged
+    ports |= looking.logged | blocks.logged
     return add_log(builder, ports, scenario.log_rate)

@@ -10,7 +10,6 @@ from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
-from cdpr_drake.systems.controllers.emergency import EmergencySettings
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopSettings
 from cdpr_drake.systems.controllers.perturbation_settings import Perturbations
 from cdpr_drake.systems.controllers.planned_pose_servo import PosePlanSettings
@@ -96,8 +95,4 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     kind: Annotated[str, OneOf((VISUAL_SERVO,)), "Kind of run."] = VISUAL_SERVO
     stop: Annotated[StopSettings, "When the run ends."]
     integration: Annotated[IntegrationSettings, "Integration."] = filled(IntegrationSettings)
-    emergency: Annotated[
-        EmergencySettings | None,
-        "What is done when a cable has broken, beside section failures; null: nothing.",
-    ] = None
     log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0
