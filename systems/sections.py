@@ -26,6 +26,8 @@ SECTIONS = {
     "visual_servo.wrench_estimation": (
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
+    "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
+    "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
 }
 """Module and class of each section, by the place of its key in scenarios; at a place, in the order

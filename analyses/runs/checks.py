@@ -9,7 +9,7 @@ from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProb
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.cameras.turning_camera import turning_camera
-from cdpr_drake.systems.diagrams.torque_control import TORQUE
+from cdpr_drake.systems.controllers.torque_settings import TORQUE
 from cdpr_drake.systems.robots.cable_robot import (
     SEMI_IMPLICIT,
     STEP_SHARE,

@@ -23,7 +23,6 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.sections.stability.section import StabilityWatch
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.pan_tilt import turned_mounting
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from tests.messages import printed
@@ -186,8 +185,15 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     at = servo.block.robot.home.transform()
 
     def turned(degrees):
-        joints = np.radians(degrees)
-        return turned_criterion(criterion, servo.mounting, scenario.camera.pan_tilt, joints)
+        joints, encoders = np.radians(degrees)
+        log, rest = (
+            {"camera_joints": joints[None], "camera_encoders": encoders[None]},
+            servo.mounting,
+        )
+        (true,), (believed,) = (
+            scenario.camera.pan_tilt.mountings(rest, log, [0], known) for known in (False, True)
+        )
+        return turned_criterion(criterion, rest.X_BC, true.X_BC, believed.X_BC)
 
     def margin(criterion):
         return criterion.at(at, at, np.ones(8, bool), 0.0)[1]
@@ -197,7 +203,7 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     wrong = turned([[20.0, 0.0], [0.0, 0.0]])
     off = criterion.camera.inverse() @ wrong.camera
     assert np.degrees(off.rotation().ToAngleAxis().angle()) == pytest.approx(20.0)
-    true = turned_mounting(servo.mounting, scenario.camera.pan_tilt, np.radians([20.0, 0.0]))
+    true = scenario.camera.pan_tilt.turned(servo.mounting, np.radians([20.0, 0.0]))
     assert true.X_BC.IsNearlyEqualTo(servo.mounting.X_BC @ off, 1e-12)
     assert margin(wrong) < 0.99 * margin(criterion)
     seen = wrong.camera @ wrong.sees(at, 0.0)

@@ -168,7 +168,8 @@ def test_readings_oftener_than_steps_are_refused():
 
 
 def test_a_loop_without_a_diagram_leaves_sensors_of_a_scene_to_a_diagram():
-    assert diagram_reason(load_scenario(LOOKING, NO_DEPTH)) == "its sensors look at a scene"
+    reason = diagram_reason(load_scenario(LOOKING, NO_DEPTH))
+    assert reason == "its section sensors.imu adds blocks to a diagram"
 
 
 def test_odometry_is_right_at_the_start_and_drifts(looking):
@@ -188,7 +189,7 @@ def test_each_sensor_has_its_own_rate(looking):
 def test_each_sensor_has_a_figure(looking):
     drawn = {"scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"}
     assert drawn <= set(looking.figures())
-    assert looking.depth_image.shape == (120, 160)
+    assert looking.at_end["depth_image"].shape == (120, 160)
     without = ServoRun(load_scenario("acrobot_moving_tag", SHORT))
     without.log = looking.log
     assert "imu" not in without.figures()
@@ -198,7 +199,7 @@ def test_a_beam_on_the_head_ends_where_the_head_says():
     """Its end, by the head's angles, is on the surface of one of the frame's boxes."""
     servo = servo_of(LOOKING, *NO_DEPTH)
     context = servo.make_context()
-    head, beam = servo.looking.pan_tilt, servo.looking.ranges["beam"]
+    head, beam = (servo.diagram.GetSubsystemByName(name) for name in ("pan_tilt", "scan_beam"))
     X_HS = servo.scenario.sensors.range_sensors[1].pose.transform()
     scene = servo.block.scene_graph
     query = scene.get_query_output_port().Eval(scene.GetMyContextFromRoot(context))
@@ -229,7 +230,7 @@ def test_a_moving_target_can_carry_a_sensor():
     up = f"sensors.range_sensors=[{{name: up, type: beam, carrier: target, pose: {pose}}}]"
     servo = servo_of(LOOKING, *NO_DEPTH, up)
     context = servo.make_context()
-    beam = servo.looking.ranges["up"]
+    beam = servo.diagram.GetSubsystemByName("scan_up")
     (found,) = beam.truth(beam.GetMyContextFromRoot(context))
     bottom = servo.true_pose(context).translation()[2]  # P is in the middle of the bottom face
     height = servo.motion.at(0.0).translation()[2]
@@ -252,7 +253,7 @@ def test_beams_of_a_scanner_on_the_hose_end_on_the_ground_and_never_below(hose, 
     context.SetTime(time)
     own, start = hose.block.GetMyMutableContextFromRoot(context), hose.scenario.initial_pose
     hose.block.set_at_equilibrium(own, start.transform())
-    sensor = hose.looking.ranges["hokuyo"]
+    sensor = hose.diagram.GetSubsystemByName("scan_hokuyo")
     found = sensor.truth(sensor.GetMyContextFromRoot(context))
     carrier = next(body for body in hose.scenario.world.obstacles if body.name == "hose")
     X_WS = carrier.path().at(time) @ hose.scenario.sensors.range_sensors[0].pose.transform()
