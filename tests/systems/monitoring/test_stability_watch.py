@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.runs.along import assess_run
+from cdpr_drake.analyses.runs.log import StoredLog
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import (
     Stability,
@@ -175,6 +176,16 @@ def test_a_log_that_lacks_something_is_refused(tmp_path):
     (tmp_path / "log.npz").write_bytes(b"PK broken")
     with pytest.raises(OutputFolderError, match=r"log\.npz cannot be read"):
         assess_run(along=tmp_path)
+
+
+def test_a_quantity_of_a_log_that_is_damaged_is_named_by_its_file(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, time=np.arange(300.0))
+    log, content = StoredLog(path), bytearray(path.read_bytes())
+    content[1000] ^= 255  # an array's numbers, of which the file has a sum
+    path.write_bytes(content)
+    with pytest.raises(OutputFolderError, match=r"log\.npz cannot be read: Bad CRC"):
+        log["time"]
 
 
 def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import yaml
 from pydrake.geometry import Box, Role
-from pydrake.systems.analysis import InitializeParams
+from pydrake.systems.analysis import InitializeParams, Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.servo import ServoRun
@@ -19,6 +21,8 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.monitoring.context_state import has_arrays_only, restore_state, state_arrays
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.sensors import add_perception_sensors
 from tests.messages import printed
 
 ENGINE = "integration.engine=compiled"
@@ -137,6 +141,8 @@ REFUSED = [
      "depth.carrier: found hose, which is not there; accepted"),
     (LOOKING, "target.motion=null",
      "sensors.odometry: found a target that no mobile robot carries"),
+    (LOOKING, "world={obstacles: [{name: pan_tilt, kind: sphere, radius: 0.1}]}",
+     "world.obstacles[0].name: found pan_tilt"),
     (LOOKING, "sensors.range_sensors=[{name: a, type: hokuyu}]", "hokuyu"),
     (LOOKING, "sensors.depth.binning=0", "binning"),
     ("caroca_world", "sensors.range_sensors=[{name: a, carrier: barrier_a}]",
@@ -222,6 +228,37 @@ def test_a_beam_on_the_head_ends_where_the_head_says():
         assert np.min(np.abs(outside)) < SAME_FRAMES
         met += 1
     assert met > 0
+
+
+def test_a_robot_without_a_servo_reads_the_same():
+    """By the same blocks and the same random numbers, under names of its own."""
+    servo = servo_of(LOOKING, *NO_DEPTH, "target.motion=null", "sensors.odometry=null")
+    builder, scenario = DiagramBuilder(), servo.scenario
+    robot = builder.AddNamedSystem("robot", CompiledCableRobot(servo.robot, scenario))
+    still = builder.AddSystem(ConstantVectorSource(np.zeros(len(servo.robot.cables))))
+    builder.Connect(still.get_output_port(), robot.GetInputPort("cable_velocities"))
+    ports = add_perception_sensors(builder, robot, scenario.sensors, seed=scenario.seed, name="r")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    pose = scenario.initial_pose.transform()
+    robot.set_at_equilibrium(robot.GetMyMutableContextFromRoot(context), pose)
+    Simulator(diagram, context).AdvanceTo(0.0)
+    whole = servo.make_context()
+    Simulator(servo.diagram, whole).AdvanceTo(0.0)
+    assert set(ports) == {
+        "specific_force", "angular_velocity", "imu_biases", "pan_tilt_angles", "pan_tilt_encoders",
+        "scan_front", "scan_beam",
+    }  # fmt: skip
+    for name in ("pan_tilt_encoders", "imu_biases", "angular_velocity", "scan_beam"):
+        block = {"pan": "pan_tilt", "scan": "scan_beam"}.get(name.split("_")[0], "imu")
+        system = servo.diagram.GetSubsystemByName(block)
+        port = system.GetOutputPort(ports[name].get_name())
+        own = ports[name].get_system()
+        assert own.get_name() == f"r_{block}"
+        np.testing.assert_allclose(
+            ports[name].Eval(own.GetMyContextFromRoot(context)),
+            port.Eval(system.GetMyContextFromRoot(whole)), atol=SAME_FRAMES,
+        )  # fmt: skip
 
 
 def test_a_moving_target_can_carry_a_sensor():
