@@ -141,7 +141,8 @@ REFUSED = [
      "depth.carrier: found hose, which is not there; accepted"),
     (LOOKING, "target.motion=null",
      "sensors.odometry: found a target that no mobile robot carries"),
-    (LOOKING, "world={obstacles: [{name: pan_tilt, kind: sphere, radius: 0.1}]}",
+    (LOOKING, "world={obstacles: [{name: pan_tilt, kind: sphere, radius: 0.1, pose: {position: "
+     "[9, 9, 9]}}]}",
      "world.obstacles[0].name: found pan_tilt"),
     (LOOKING, "sensors.range_sensors=[{name: a, type: hokuyu}]", "hokuyu"),
     (LOOKING, "sensors.depth.binning=0", "binning"),
