@@ -156,7 +156,7 @@ WORLD = Subject(
 
 
 def true_force(log: Mapping[str, Array]) -> Array:
-    """Force of disturbances and contact on the platform in W, shape (n, 3) [N]."""
+    """Force of pushes and contact on the platform in W, shape (n, 3) [N]."""
     force = np.zeros((len(log["time"]), 3))
     if APPLIED_WRENCH in log:
         force = force + np.asarray(log[APPLIED_WRENCH])[:, 3:]
@@ -238,18 +238,7 @@ PROGRAM_STEPS = Subject(
 )
 
 
-# What pushes and breaks in a visual servo
-
-
-def disturbance_numbers(run: Run) -> dict[str, float]:
-    """Largest force and moment on the platform in the rows of the log, and their times."""
-    wrenches, numbers = run.log[APPLIED_WRENCH], {}
-    for name, unit, part in (("force", "n", slice(3, 6)), ("moment", "nm", slice(3))):
-        sizes = np.linalg.norm(wrenches[:, part], axis=1)
-        k = int(np.argmax(sizes))
-        numbers[f"largest_{name}_{unit}"] = float(sizes[k])
-        numbers[f"largest_{name}_at_s"] = float(run.log["time"][k])
-    return numbers
+# What breaks in a visual servo
 
 
 def failure_numbers(run: Run) -> dict[str, Any]:
@@ -295,9 +284,6 @@ def _gain(run: Run) -> Any:
 
 
 TENSION_GAIN = Subject("tension_gain", gain_numbers, applies=lambda run: _gain(run) is not None)
-DISTURBANCES = Subject(
-    "disturbances", disturbance_numbers, applies=lambda run: APPLIED_WRENCH in run.log
-)
 FAILURES = Subject(
     "failures", failure_numbers, applies=lambda run: run.scenario.failures is not None
 )

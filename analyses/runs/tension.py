@@ -62,6 +62,7 @@ from cdpr_drake.systems.robots.settings import (
 )
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, engine_of
+from cdpr_drake.systems.sections import sections_of
 
 
 class TensionRun(Run):
@@ -105,7 +106,7 @@ class TensionRun(Run):
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
             force=scenario.force_control,
-            disturbances=scenario.disturbances,
+            sections=[section for _, section in sections_of(scenario)],
             seed=scenario.seed,
             damping=scenario.damping,
         )

@@ -95,9 +95,8 @@ def _control_refusals(scope: Scope) -> Iterator[Refusal]:
     for key, other in product(beside, ("remote", "predictive")):
         if beside[key] is not None and getattr(scenario, other) is not None:
             yield key, f"beside {other}", "one of both"
-    for key in ("force_control", "disturbances"):
-        if getattr(scenario, key) is not None and scenario.integration.engine == COMPILED:
-            yield "integration.engine", f"{COMPILED} beside {key}", "plant"
+    if scenario.force_control is not None and scenario.integration.engine == COMPILED:
+        yield "integration.engine", f"{COMPILED} beside force_control", "plant"
     for key in ("predictive", "force_control"):
         if getattr(scenario, key) is not None and scenario.controller.balance != WRENCH:
             found = f"{scenario.controller.balance} beside {key}"

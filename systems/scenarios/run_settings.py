@@ -11,6 +11,7 @@ from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, settings
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, PLANT
+from cdpr_drake.systems.sections import with_sections
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
 DIAGRAM = "diagram"
@@ -54,6 +55,7 @@ class RunHeader:
 
 
 @settings
+@with_sections("robot_scenario")
 class ScenarioHeader(RunHeader):
     """What a scenario is called, which robot it moves, and how long it runs."""
 

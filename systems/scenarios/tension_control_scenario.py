@@ -21,10 +21,10 @@ from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, Text, fil
 from cdpr_drake.systems.controllers.force_tracking import ForceControl
 from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.disturbances import DisturbanceSettings
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, DampingSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from cdpr_drake.trajectories.sampled_motion import read_motion
@@ -203,9 +203,6 @@ class TensionScenario(ScenarioHeader):
         ForceControl | None,
         "How the platform answers forces, by the engine plant; null: as computed torque does.",
     ] = None
-    disturbances: Annotated[
-        DisturbanceSettings | None, "What pushes the platform, by the engine plant; null: nothing."
-    ] = None
     integration: Annotated[StepSettings, "Integration."] = filled(StepSettings)
     perturbations: Annotated[TensionBelief, "What the controller believes wrongly."] = filled(
         TensionBelief
@@ -220,7 +217,8 @@ class TensionScenario(ScenarioHeader):
     @property
     def plant_alone(self) -> bool:
         """Whether the engine plant alone can run it."""
-        return self.force_control is not None or self.disturbances is not None
+        alone = any(section.plant_alone for _, section in sections_of(self))
+        return alone or self.force_control is not None
 
     def step_rule(self) -> StepRule | None:
         """How the robot is integrated in compiled steps; None by the engine plant."""

@@ -1,4 +1,4 @@
-"""What pushes the platform beside its cables: section `disturbances` of a scenario, and its block.
+"""Section `disturbances` of a scenario, and its block: what pushes the platform beside its cables.
 
 Every push begins at a time and may end at one. A force f acts at a point Q of the platform, so that
 the wrench about Po is (m + p_PoQ x f, f).
@@ -17,20 +17,30 @@ the wrench about Po is (m + p_PoQ x f, f).
 Source of the spectrum: MIL-F-8785C, Flying qualities of piloted airplanes, 1980, 3.7.1.2.
 """
 
-from collections.abc import Iterator
-from typing import Annotated
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    DiagramBuilder,
+    DiscreteValues,
+    LeafSystem,
+    OutputPort,
+)
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.sensor_noise import sample_noise
 from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, settings, values
 from cdpr_drake.schema.typed_yaml import refuse
-from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.robots.settings import COMPILED, PLANT
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
+from cdpr_drake.systems.sections import Platform, Section
 
 STEP, PUSH, SINE, WIND, PAYLOAD = "step", "push", "sine", "wind", "payload"
 
@@ -56,6 +66,9 @@ AIR = 1.225
 
 STREAM = 4200
 """Stream of the wind's random numbers, apart from those of sensors; one more for each wind."""
+
+LARGEST_FORCE, LONGEST_PUSH = 1e6, 60.0
+"""Limits of a push by hand [N, s]."""
 
 
 @settings
@@ -156,8 +169,13 @@ class Push:
 
 
 @settings
-class DisturbanceSettings:
+class DisturbanceSettings(Section):
     """What pushes the platform, and how often that changes."""
+
+    words = "What pushes the platform beside its cables; dynamic control has it by the engine plant"
+    report = "cdpr_drake.sections.disturbances.report:SUBJECTS"
+    plant_alone = True
+    by_hand: ClassVar = {PUSH: "{pushes: [{kind: step, force: [0.0, 0.0, 0.0]}]}"}
 
     pushes: Annotated[list[Push], "What pushes the platform; all of it adds up."]
     rate: Annotated[
@@ -167,24 +185,59 @@ class DisturbanceSettings:
     ] = 1000.0
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """No push at all."""
+        """No push at all, or an engine that does not have them."""
         if not self.pushes:
             yield "pushes", "none", "at least one"
+        whole = scope.whole
+        by_tensions = getattr(whole, "kind", None) == TENSION_CONTROL
+        if by_tensions and whole.integration.engine == COMPILED:
+            yield "/integration.engine", f"{COMPILED} beside disturbances", PLANT
+
+    def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort:
+        """Adds `Disturbances`."""
+        gravity = platform.robot.gravity_vector()
+        block = Disturbances(self, gravity, seed=platform.seed)
+        builder.AddNamedSystem(platform.prefix + "disturbances", block)
+        builder.Connect(platform.X_WP, block.get_input_port())
+        return block.get_output_port()
+
+    def do(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
+        """Pushes at Po with half a sine of the peak `force` in W, for `seconds`."""
+        try:
+            force = np.array(request.get("force"), float)
+            seconds = float(request.get("seconds", np.nan))
+        except (TypeError, ValueError):
+            force, seconds = np.full(3, np.nan), np.nan
+        size = float(np.linalg.norm(force)) if force.shape == (3,) else np.nan
+        if not 0.0 < size <= LARGEST_FORCE:
+            raise ScenarioError(
+                f"force: found {str(request.get('force'))[:60]}; accepted: three numbers, together "
+                f"above 0 to {LARGEST_FORCE:g} N"
+            )
+        if not 0.0 < seconds <= LONGEST_PUSH:
+            raise ScenarioError(
+                f"seconds: found {str(request.get('seconds'))[:60]}; accepted: above 0 to "
+                f"{LONGEST_PUSH:g} s"
+            )
+        period = 1.0 / self.rate
+        start = (math.floor(now / period) + 1) * period  # a period under way is not changed
+        self.pushes.append(Push(kind=PUSH, start=start, end=start + seconds, force=force))
+        return {"t": now, "words": f"push of {size:g} N for {seconds:g} s"}
 
 
 class Disturbances(LeafSystem):
     """What pushes a platform, as a wrench that is constant from period to period.
 
-    ============== ============== ====== ======================================================
-    port           type           unit   meaning
-    ============== ============== ====== ======================================================
-    X_WP           RigidTransform m      in, pose of the platform, read at the period's begin
-    applied_wrench vector(6)      N m, N in, may stay open: what else pushes it
-    wrench         vector(6)      N m, N out, moment about Po and force, in W, of all of it
-    ============== ============== ====== ======================================================
+    ====== ============== ====== ================================================================
+    port   type           unit   meaning
+    ====== ============== ====== ================================================================
+    X_WP   RigidTransform m      in, pose of the platform, read at the period's begin
+    wrench vector(6)      N m, N out, moment about Po and force, in W, for a robot's applied_wrench
+    ====== ============== ====== ================================================================
 
-    State: wrench, gusts, and their number. Random numbers depend on the seed and the number of the
-    period alone.
+    State: wrench, and the gusts of each push. Random numbers depend on the seed and the number of
+    the period alone. A push but wind may be appended to those of the settings before it begins,
+    while a simulation runs.
     """
 
     def __init__(self, settings: DisturbanceSettings, gravity: Array, *, seed: int = 0) -> None:
@@ -195,34 +248,14 @@ class Disturbances(LeafSystem):
         self._period = 1.0 / settings.rate
         self._turbulence = [push.turbulence(self._period) for push in settings.pushes]
         self._pose = self.DeclareAbstractInputPort("X_WP", Value(RigidTransform()))
-        self._more = self.DeclareVectorInputPort(APPLIED_WRENCH, 6)
-        n = 6 + 3 * len(settings.pushes)
-        state = self.DeclareDiscreteState(n)
-        needs = {self.discrete_state_ticket(state), self._more.ticket()}
+        state = self.DeclareDiscreteState(6 + 3 * len(settings.pushes))
+        needs = {self.discrete_state_ticket(state)}
         self.DeclareVectorOutputPort("wrench", 6, self._calc, needs)
         self.DeclareInitializationDiscreteUpdateEvent(self._begin)
         self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
 
-    @property
-    def period(self) -> float:
-        """Time between changes of the wrench [s]."""
-        return self._period
-
-    def add(self, push: Push) -> None:
-        """Adds a push that begins later, but no wind, whose gusts are part of the state.
-
-        It stands in the settings then: a run with those from the start is the same run.
-        """
-        if push.kind == WIND:
-            raise ScenarioError("push: found wind; accepted: a kind without gusts")
-        refuse(push, "push", error=ScenarioError)
-        self._settings.pushes.append(push)
-        self._turbulence.append((0.0, 0.0))
-
     def _calc(self, context: Context, output: BasicVector) -> None:
-        own = context.get_discrete_state_vector().value()[:6]
-        more = self._more.Eval(context) if self._more.HasValue(context) else 0.0
-        output.SetFromVector(own + more)
+        output.SetFromVector(context.get_discrete_state_vector().value()[:6])
 
     def _begin(self, context: Context, state: DiscreteValues) -> None:
         if context.get_time() == 0.0:
@@ -237,7 +270,7 @@ class Disturbances(LeafSystem):
         middle = (number_ + 0.5) * self._period
         out = np.zeros_like(now)
         for k, push in enumerate(self._settings.pushes):
-            kept, sigma = self._turbulence[k]
+            kept, sigma = self._turbulence[k] if k < len(self._turbulence) else (0.0, 0.0)
             gust = slice(6 + 3 * k, 9 + 3 * k)
             if sigma > 0.0:
                 fresh = sample_noise(self._seed, STREAM + k, number_, 3)
