@@ -112,6 +112,9 @@ class Section:
     def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort | None:
         """Adds what pushes the platform, in a scenario of any kind but a mechanism's.
 
+        The engine compiled takes a wrench that follows the platform only from a state that its
+        block samples; by the plant it may follow pose and state at once.
+
         Args:
             builder: The DiagramBuilder that has the robot.
             platform: The platform.
