@@ -348,8 +348,9 @@ class ByHand:
     def __init__(self, scenario: Any) -> None:
         """For the scenario of which the diagram is built."""
         sections = {act: getattr(scenario, key, None) for act, (key, _) in UNTOUCHED.items()}
-        if sections[BREAK] is not None and sections[BREAK].events:
-            sections[BREAK] = None  # events at the start fix the times of events in the diagram
+        failures: Any = sections[BREAK]
+        if failures is not None and failures.events:
+            del sections[BREAK]  # events at the start fix the times of events in the diagram
         self._sections = {act: section for act, section in sections.items() if section is not None}
         self.takes = tuple(self._sections)
         self._cables = [cable.name for cable in load_robot(scenario.robot).cables]
