@@ -25,6 +25,8 @@ SECTIONS = {
     "visual_servo.wrench_estimation": (
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
+    "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
+    "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
     "robot_scenario.disturbances": "cdpr_drake.sections.disturbances.section:DisturbanceSettings",
 }
@@ -69,7 +71,6 @@ class Section:
         columns: By the names of the quantities that it logs: what their numbers are called in
             `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
-        plant_alone: Whether the engine plant alone has it in dynamic control by tensions.
         by_hand: By what can be done by hand to a run that goes on, see `do`: the section's least
             content, as YAML, which lets it be done and changes nothing. Of `robot_scenario` only.
     """
@@ -77,7 +78,6 @@ class Section:
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
     report: ClassVar[str] = ""
-    plant_alone: ClassVar[bool] = False
     by_hand: ClassVar[Mapping[str, str]] = {}
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
@@ -95,6 +95,10 @@ class Section:
             A `FeatureServo`; None: the law alone, or what another section makes.
         """
         return None
+
+    def needs_plant(self, scenario: Any) -> bool:
+        """Whether the engine plant alone can run a scenario that has it."""
+        return False
 
     def add_to(self, builder: Any, blocks: Any, settings: Any) -> Mapping[str, Any]:
         """Adds its blocks to a visual servo.

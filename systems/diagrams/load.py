@@ -54,6 +54,7 @@ from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.systems.worlds.checks import world_refusals
 from cdpr_drake.systems.worlds.world import make_world
 from cdpr_drake.tensions.methods import distribute
@@ -101,6 +102,14 @@ def _control_refusals(scope: Scope) -> Iterator[Refusal]:
         if getattr(scenario, key) is not None and scenario.controller.balance != WRENCH:
             found = f"{scenario.controller.balance} beside {key}"
             yield "controller.balance", found, WRENCH
+
+
+def _engine_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Sections beside the engine compiled that the plant alone can run."""
+    scenario = scope.whole
+    for key, section in sections_of(scenario):
+        if section.needs_plant(scenario) and scenario.integration.engine == COMPILED:
+            yield "integration.engine", f"{COMPILED} beside {key}", "plant"
 
 
 def _tension_refusals(scope: Scope) -> Iterator[Refusal]:
@@ -218,8 +227,8 @@ def check_robot_motion(robot: Robot, where: Path | str) -> None:
 
 
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], tuple[Callable[[Scope], Iterator[Refusal]], ...]]] = {
-    VISUAL_SERVO: (Scenario, (belief_refusals, *SERVO_REFUSALS)),
-    TENSION_CONTROL: (TensionScenario, (belief_refusals, _tension_refusals)),
+    VISUAL_SERVO: (Scenario, (belief_refusals, _engine_refusals, *SERVO_REFUSALS)),
+    TENSION_CONTROL: (TensionScenario, (belief_refusals, _engine_refusals, _tension_refusals)),
     PICK_AND_PLACE: (PickAndPlaceScenario, (pick_and_place_refusals,)),
     MECHANISM: (MechanismScenario, (mechanism_refusals,)),
 }

@@ -24,7 +24,6 @@ from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, DampingSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
-from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from cdpr_drake.trajectories.sampled_motion import read_motion
@@ -217,8 +216,7 @@ class TensionScenario(ScenarioHeader):
     @property
     def plant_alone(self) -> bool:
         """Whether the engine plant alone can run it."""
-        alone = any(section.plant_alone for _, section in sections_of(self))
-        return alone or self.force_control is not None
+        return self.force_control is not None
 
     def step_rule(self) -> StepRule | None:
         """How the robot is integrated in compiled steps; None by the engine plant."""

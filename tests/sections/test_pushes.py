@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource, LogVectorOutput, MatrixGain
 
 from cdpr_drake.analyses.runs.simulate import KINDS
+from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.schema.typed_yaml import refuse
@@ -140,7 +141,6 @@ class Air(Section):
     """Air that brakes the platform by its velocity: a toy of a section that pushes."""
 
     words = "Air"
-    plant_alone = True
 
     drag: Annotated[float, In("N s/m", gt=0.0), "Force per velocity."] = DRAG_OF_AIR
 
@@ -193,3 +193,10 @@ def test_a_section_brakes_a_platform_by_its_velocity_and_another_pushes_beside_i
     plain = run(load_scenario(name, [*quick, "log_rate=1000"])).simulate().log
     assert "applied_wrench" not in plain
     assert np.max(np.abs(plain["X_WP"] - alone["X_WP"])) > 1e-9
+
+
+def test_compiled_steps_of_dynamic_control_refuse_what_pushes():
+    compiled = ["integration.engine=compiled"]
+    scenario = load_scenario("acrobot_computed_torque", compiled, schema=AiryTensions)
+    with pytest.raises(ScenarioError, match=r"integration\.engine: found compiled beside what pu"):
+        TensionRun(scenario).simulate()

@@ -38,7 +38,6 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.estimation.sensor_noise import sample_noise
 from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, settings, values
 from cdpr_drake.schema.typed_yaml import refuse
-from cdpr_drake.systems.robots.settings import COMPILED, PLANT
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.sections import Platform, Section
 
@@ -174,7 +173,6 @@ class DisturbanceSettings(Section):
 
     words = "What pushes the platform beside its cables; dynamic control has it by the engine plant"
     report = "cdpr_drake.sections.disturbances.report:SUBJECTS"
-    plant_alone = True
     by_hand: ClassVar = {PUSH: "{pushes: [{kind: step, force: [0.0, 0.0, 0.0]}]}"}
 
     pushes: Annotated[list[Push], "What pushes the platform; all of it adds up."]
@@ -185,13 +183,13 @@ class DisturbanceSettings(Section):
     ] = 1000.0
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """No push at all, or an engine that does not have them."""
+        """No push at all."""
         if not self.pushes:
             yield "pushes", "none", "at least one"
-        whole = scope.whole
-        by_tensions = getattr(whole, "kind", None) == TENSION_CONTROL
-        if by_tensions and whole.integration.engine == COMPILED:
-            yield "/integration.engine", f"{COMPILED} beside disturbances", PLANT
+
+    def needs_plant(self, scenario: Any) -> bool:
+        """Whether a scenario is one of dynamic control by tensions."""
+        return bool(scenario.kind == TENSION_CONTROL)
 
     def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort:
         """Adds `Disturbances`."""
