@@ -19,7 +19,6 @@ from .analyses.logs.import_log import import_log as import_log
 from .analyses.logs.replay import replay_log as replay_log
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
-from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
 from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
@@ -59,6 +58,7 @@ from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names
 from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
+from .proofs.proven_plan import plan_proven_motion as plan_proven_motion
 from .servoing.servo_law import ServoLaw as ServoLaw
 from .servoing.servo_task import BelievedRobot as BelievedRobot
 from .systems.batches.batch_robots import BatchRobots as BatchRobots

@@ -160,7 +160,7 @@ COMMANDS = {
                 "Plans a motion from one pose to another whose path is free, within limits.",
             ),
             "proven": (
-                f"{_VERBS}.planning.proven_plan:plan_proven_motion",
+                "cdpr_drake.proofs.proven_plan:plan_proven_motion",
                 "Plans a motion from one pose to another in sets of poses that are proven.",
             ),
         },

@@ -25,7 +25,7 @@ from cdpr_drake.proofs.box_timing import inertial_terms, mass_of
 from cdpr_drake.proofs.moving_clearances import moving_clearances
 
 if TYPE_CHECKING:
-    from cdpr_drake.analyses.planning.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan
+    from cdpr_drake.proofs.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan
 
 POINTS = 400  # points of curves
 VIEWS = ((0, 1), (0, 2), (1, 2))  # coordinates across and up of the three views

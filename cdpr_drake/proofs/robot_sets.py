@@ -8,7 +8,6 @@ from itertools import product
 
 import numpy as np
 
-from cdpr_drake.analyses.workspaces.box_certificates import BoxSearch, box_search
 from cdpr_drake.analyses.workspaces.conditions import KINDS, PoseConditions, Poses
 from cdpr_drake.analyses.workspaces.pose_grid import check_grid
 from cdpr_drake.analyses.workspaces.robot_conditions import (
@@ -22,6 +21,7 @@ from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.proofs.certified_workspace import BoxSearch, box_search
 from cdpr_drake.proofs.proven_cells import CELLS, ProvenCells, prove_cells
 from cdpr_drake.proofs.proven_connection import connect_poses, inside_cell
 from cdpr_drake.proofs.proven_sets import COVER, PoseSets, sets_of_cells

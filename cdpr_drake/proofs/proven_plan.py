@@ -29,7 +29,6 @@ from cdpr_drake.analyses.frame.words import (
     words,
 )
 from cdpr_drake.analyses.planning.free_plan import Goal, Start
-from cdpr_drake.analyses.planning.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan, judged
 from cdpr_drake.analyses.planning.path_plan import StreamModel
 from cdpr_drake.analyses.planning.plans import finished
 from cdpr_drake.analyses.planning.robot_path_task import (
@@ -38,13 +37,6 @@ from cdpr_drake.analyses.planning.robot_path_task import (
     path_task,
     pose_in_degrees,
     robot_limits,
-)
-from cdpr_drake.analyses.workspaces.proven_sets import (
-    BOXES,
-    ProofSettings,
-    ProvenSets,
-    explain_pose,
-    find_timed_sets,
 )
 from cdpr_drake.analyses.workspaces.workspace_files import load_all_obstacles
 from cdpr_drake.arrays import Array
@@ -55,7 +47,15 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.planning.path_timing import STATIONS
+from cdpr_drake.proofs.motions_in_sets import MotionInSets, ProvenPlan, TimedPlan, judged
 from cdpr_drake.proofs.path_in_sets import METHODS, proven_motion
+from cdpr_drake.proofs.robot_sets import (
+    BOXES,
+    ProofSettings,
+    ProvenSets,
+    explain_pose,
+    find_timed_sets,
+)
 from cdpr_drake.proofs.timed_motion import motion_in_time, straight_time
 from cdpr_drake.proofs.timed_sets import TimedSets
 from cdpr_drake.workspaces.cable_interference import Surroundings

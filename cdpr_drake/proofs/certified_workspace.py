@@ -1,31 +1,40 @@
-"""Boxes of poses that are proven inside or outside: found, kept, compared with grid and hull."""
+"""Workspaces with boxes of poses proven inside or outside: `certify` of `compute_workspace`."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder, load_arrays
+from cdpr_drake.analyses.frame.follow import Count, Follow
 from cdpr_drake.analyses.reporting.provenance import code_version
+from cdpr_drake.analyses.reporting.written_files import whole_file
 from cdpr_drake.analyses.workspaces.conditions import PoseConditions
 from cdpr_drake.analyses.workspaces.pose_grid import plain
+from cdpr_drake.analyses.workspaces.workspace_result import Workspace
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DataFileError, WorkspaceError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.proofs.box_expansion_kernel import OPEN
-from cdpr_drake.proofs.box_grid_agreement import BoxAgreement
+from cdpr_drake.proofs.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
 from cdpr_drake.proofs.box_judges import MEETING, CertifiedKind, CertifyTask
 from cdpr_drake.proofs.box_refinement import PathTube, refine
 from cdpr_drake.proofs.certified_boxes import BoxJournal, CertifiedBoxes, PoseBox, certify
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from cdpr_drake.workspaces.mesh_files import write_cells
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 
 BOX_ARRAYS, JOURNAL, REFINED_JOURNAL = "boxes.npz", "boxes_journal.npz", "refined_journal.npz"
 """Files of the boxes, and of what a search, or one along a way, that is continued begins with."""
@@ -38,6 +47,12 @@ SAVE_SECONDS = 5.0
 
 NAMED = 5
 """So many poses at which boxes are wrong are written out."""
+
+CONTRADICTION = 1
+"""Exit code if a proof contradicts the grid or the hull."""
+
+COMPARED = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
+"""What boxes are compared with, in words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,3 +276,146 @@ def agreement_numbers(agreement: BoxAgreement) -> dict[str, Any]:
         "contradictions": len(agreement.broken),
         "first_contradictions_m_rad": agreement.broken[:NAMED].tolist(),
     }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class CertifiedWorkspace(Workspace):
+    """A workspace over a grid, with boxes of poses that are proven inside or outside.
+
+    Attributes:
+        boxes: Boxes proven inside or outside.
+        search: What was cut into boxes.
+        refined: How boxes were cut further along a way, as `refined_boxes` says.
+    """
+
+    boxes: CertifiedBoxes
+    search: BoxSearch
+    refined: dict[str, Any] | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """1 if a proof contradicts the grid or the hull, 130 if the call was stopped."""
+        if any(len(part.broken) for part in self.agreement.values()):
+            return CONTRADICTION
+        return super().exit_code
+
+    @cached_property
+    def agreement(self) -> dict[str, BoxAgreement]:
+        """What boxes say of every pose of the grid, and of the ends of a hull's rays.
+
+        A pose that is no part of the workspace contradicts a box proven inside around it, and one
+        of the workspace contradicts a box proven outside.
+        """
+        parts = {"grid": grid_agreement(self.boxes, self.grid, self.inside())}
+        if self.hull is not None and len(self.grid.angles) == 1:
+            parts["hull"] = hull_agreement(self.boxes, self.hull, self.grid.angles[0])
+        return parts
+
+    def as_dict(self) -> dict[str, Any]:
+        """As a workspace's, with shares of the boxes and what they say of grid and hull."""
+        return {
+            **super().as_dict(), "certified": box_numbers(self.boxes, self.search),
+            **({} if self.refined is None else {"refined": self.refined}),
+            "agreement": {name: agreement_numbers(part) for name, part in self.agreement.items()},
+        }  # fmt: skip
+
+    def last_lines(self) -> list[str]:
+        """Boxes and contradictions, and as a workspace's."""
+        return [*self._box_lines(), *super().last_lines()]
+
+    def _box_lines(self) -> list[str]:
+        about = box_numbers(self.boxes, self.search)
+        lines = [
+            f"certified, cables {about['cables']}: all poses in {about['inside_share']:.2%} of the "
+            f"box inside, in {about['outside_share']:.2%} outside, {about['open_share']:.2%} open; "
+            f"{about['boxes_judged']} boxes"
+        ]
+        if (finer := self.refined) is not None:
+            lines.append(
+                f"boxes within {finer['reach_m']:g} m of the way: "
+                f"{finer['open_share_before']:.2%} of them were open, "
+                f"{finer['open_share_after']:.2%} are; {finer['boxes_judged']} boxes"
+            )
+        return lines + [
+            f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at {part.poses} of "
+            f"them; {part.inside} in boxes proven inside, {part.outside} outside"
+            for name, part in self.agreement.items()
+        ]
+
+    def notes(self) -> list[str]:
+        """As a workspace's, and proofs that are wrong."""
+        return super().notes() + [
+            f"error: proven boxes contradict {len(part.broken)} of {part.poses} {COMPARED[name]}, "
+            f"first at ({', '.join(f'{x:g}' for x in part.broken[0])}) [m, rad]: proof or kernel "
+            "is wrong; do not use these results, and report them"
+            for name, part in self.agreement.items() if len(part.broken)
+        ]  # fmt: skip
+
+    def figures(self) -> dict[str, Callable[[], Figure]]:
+        """As a workspace's, and the boxes."""
+        from cdpr_drake.proofs import box_figures as draw
+
+        name, kinds = self.arguments["robot"], list(self.arguments["kinds"])
+        return super().figures() | {
+            "open_share": partial(draw.boxes_figure, self.boxes, name, self.geometry),
+            "boxes": partial(draw.box_planes_figure, self.boxes, name, kinds),
+        }
+
+    def write(self, folder: Folder, formats: Sequence[str], follow: Follow) -> dict[str, str]:
+        """Writes the boxes, too."""
+        save_boxes(self.boxes, folder)
+        return super().write(folder, formats, follow)
+
+    def page(self, robot: Robot) -> tuple[Pictures, str]:
+        """As a workspace's, with the boxes."""
+        from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
+        from cdpr_drake.proofs.box_figures import box_solids
+
+        solids = box_solids(self.boxes)
+        return workspace_page(
+            self, robot, [(f"boxes/{name}, {words}", *rest) for name, words, *rest in solids]
+        )
+
+
+def certified(
+    workspace: Workspace, search: BoxSearch, most_boxes: int, mesh: Path | None,
+    way: Array | None, reach: float, more_boxes: int, folder: Folder | None, follow: Follow,
+) -> CertifiedWorkspace:  # fmt: skip
+    """A workspace with its boxes, cut further along a way of Po if there is one.
+
+    Args:
+        workspace: Where kinds hold on a grid.
+        search: As `box_search` gives it.
+        most_boxes: How many boxes are judged, at most.
+        mesh: File for the boxes as cells of VTK.
+        way: As `refined_boxes`, like reach.
+        reach: How far Po may be off the way along each axis [m].
+        more_boxes: How many more boxes are judged along the way, at most.
+        folder: Keeps what was judged.
+        follow: Who follows.
+
+    Raises:
+        WorkspaceError: As `certified_boxes` and `refined_boxes`.
+        OutputFolderError: The folder cannot be written.
+    """
+
+    def counting(total: int) -> dict[str, Any]:
+        counter = Count(follow, total, unit="boxes")
+        return {
+            "on_progress": lambda judged, share: counter.add(
+                judged - counter.done, f"{share:.1%} open"
+            ),
+            "should_stop": follow.stop,
+        }
+
+    boxes, refined = certified_boxes(search, most_boxes, folder, **counting(most_boxes)), None
+    if way is not None and boxes.finished:
+        boxes, refined = refined_boxes(
+            boxes, search, way, reach, more_boxes, folder, **counting(more_boxes)
+        )
+    if mesh is not None:
+        with whole_file(mesh) as part:
+            write_boxes(boxes, part)
+    parts = {field.name: getattr(workspace, field.name) for field in fields(workspace)}
+    parts["stopped"] = not boxes.finished
+    return CertifiedWorkspace(**parts, boxes=boxes, search=search, refined=refined)

@@ -13,12 +13,12 @@ import numpy as np
 
 from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.planning.plans import Plan
-from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.arrays import Array
 from cdpr_drake.planning.path_timing import PathPlan
 from cdpr_drake.proofs.moving_clearances import moving_clearances
 from cdpr_drake.proofs.path_in_sets import ProvenMotion
 from cdpr_drake.proofs.proven_sets import PoseSets
+from cdpr_drake.proofs.robot_sets import ProvenSets
 from cdpr_drake.proofs.timed_motion import MotionInTime
 from cdpr_drake.proofs.timed_sets import TimedSets
 from cdpr_drake.workspaces.cable_interference import Surroundings
@@ -216,7 +216,7 @@ class ProvenPlan(MotionInSets):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """Sets, obstacles and the path first; accelerations if they are proven."""
-        from cdpr_drake.analyses.planning import set_figures as draw
+        from cdpr_drake.proofs import set_figures as draw
 
         figures: dict[str, Callable[[], Figure]] = {
             "sets": partial(draw.sets_figure, self),
@@ -328,7 +328,7 @@ class TimedPlan(MotionInSets):
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The way in space and time first."""
-        from cdpr_drake.analyses.planning import set_figures as draw
+        from cdpr_drake.proofs import set_figures as draw
 
         return {
             "space_time": partial(draw.space_time_figure, self),
@@ -339,7 +339,7 @@ class TimedPlan(MotionInSets):
 
     def pages(self) -> dict[str, Callable[[Path], object]]:
         """A replay, in which obstacles move, too."""
-        from cdpr_drake.analyses.planning.set_figures import write_timed_replay
+        from cdpr_drake.proofs.set_figures import write_timed_replay
 
         return {REPLAY: partial(write_timed_replay, self)}
 
