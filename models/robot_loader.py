@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +19,7 @@ import numpy as np
 from cdpr_drake.errors import RobotFileError, why_not_read
 from cdpr_drake.models.camera_files import resolved_camera
 from cdpr_drake.models.exit_points import MARK, split_name
-from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
+from cdpr_drake.models.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.mechanism_files import (
     MECHANISM_FILE,
     is_mechanism,
@@ -40,6 +41,9 @@ from cdpr_drake.schema.input_files import (
 from cdpr_drake.schema.typed_yaml import closest, dump_typed, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
+
+READERS = "cdpr_drake.formats.detection"
+"""Module that reads the files of other tools."""
 
 
 def robot_names() -> tuple[str, ...]:
@@ -113,11 +117,8 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
 
 
 def _foreign_content(path: Path) -> str:
-    """The robot file that the file of another tool makes, as YAML; imports all readers."""
-    from cdpr_drake.models.formats.assumptions import complete_draft
-    from cdpr_drake.models.formats.detection import read_foreign
-
-    return made_of_input(path, lambda: complete_draft(read_foreign(path)).yaml())
+    """The robot file that the file of another tool makes, as YAML."""
+    return made_of_input(path, lambda: import_module(READERS).foreign_yaml(path))
 
 
 def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:

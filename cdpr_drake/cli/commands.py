@@ -102,12 +102,13 @@ COMMANDS = {
         ("cdpr studio acrobot_large", "cdpr studio mine.yaml --port 7100"),
     ),
     "import": Command(
-        _FILES, f"{_VERBS}.exchange:import_files",
+        _FILES, "cdpr_drake.formats.exchange:import_files",
         "Imports a robot from a file of another tool into a folder.",
         ("cdpr import IPAnema_1_bodies.xml", "cdpr import robot.urdf --out mine"),
     ),
     "export": Command(
-        _FILES, f"{_VERBS}.exchange:export_files", "Exports a robot to the format of another tool.",
+        _FILES, "cdpr_drake.formats.exchange:export_files",
+        "Exports a robot to the format of another tool.",
         ("cdpr export caroca --format mjcf", "cdpr export caroca --format sdf --out here"),
     ),
     "schema": Command(

@@ -22,7 +22,7 @@ from cdpr_drake.analyses.workspaces.robot_conditions import (
     static_case,
 )
 from cdpr_drake.analyses.workspaces.workspace_hulls import robot_hull
-from cdpr_drake.models.robot_exchange import import_robot
+from cdpr_drake.formats.robot_exchange import import_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.proofs import certified_workspace
 from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OUTSIDE
@@ -31,7 +31,7 @@ from cdpr_drake.proofs.certified_workspace import box_search, certified_boxes
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.cli.commands import STORE_ARRAYS, ended, killed_after
 from tests.cli.conftest import only
-from tests.models.formats import foreign_files
+from tests.formats import foreign_files
 from tests.motion.small_robots import content
 
 
