@@ -37,8 +37,8 @@ from tests.analyses.fits.logs import (
     write_motion,
 )
 from tests.cli.commands import answer, ended, refuse, run, told, write_log
-from tests.formats.foreign_files import KLIPPER, MASLOW, REPRAP
 from tests.identification import logs as motions
+from tests.models.formats.foreign_files import KLIPPER, MASLOW, REPRAP
 from tests.vision.boards import board_image, board_poses, make_board
 
 # Robots from trackers, cameras, winches and a recorded series.

@@ -27,7 +27,7 @@ from cdpr_drake.models.sensor_catalogue import (
     tension_sensor_names,
 )
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
-from tests.formats.unusual_robots import made
+from tests.models.formats.unusual_robots import made
 from tests.models.published_points import LARGE_ANCHORS
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 

@@ -11,7 +11,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.page import PREFERS_DARK
 from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions
 from cdpr_drake.studio.workbench.yaml_edit import with_value
-from tests.formats.foreign_files import caspr
+from tests.models.formats.foreign_files import caspr
 from tests.studio.fuzz import fuzz
 from tests.studio.pages import field, problems, shown, type_into, until
 

@@ -14,7 +14,7 @@ from cdpr_drake.studio.workbench.scene import EXITS
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
-from tests.formats.foreign_files import caspr
+from tests.models.formats.foreign_files import caspr
 
 ROUNDING = 1e-9
 """Of coordinates, there and back [m, deg]."""

@@ -24,7 +24,7 @@ from cdpr_drake.schema.input_files import (
     inputs_read_once,
 )
 from cdpr_drake.systems.worlds.model_files import mesh_parts
-from tests.formats.foreign_files import caspr
+from tests.models.formats.foreign_files import caspr
 from tests.models.test_drake_parsing import MECHANISM
 
 OBJ = "v -0.05 -0.05 -0.04\nv {x} 0 0\nv 0 0.1 0\nv 0 0 0.04\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

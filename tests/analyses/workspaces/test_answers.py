@@ -31,7 +31,7 @@ from cdpr_drake.proofs.certified_workspace import box_search, certified_boxes
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.cli.commands import STORE_ARRAYS, ended, killed_after
 from tests.cli.conftest import only
-from tests.formats import foreign_files
+from tests.models.formats import foreign_files
 from tests.motion.small_robots import content
 
 

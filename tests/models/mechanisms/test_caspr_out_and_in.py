@@ -31,9 +31,9 @@ from cdpr_drake.formats.caspr_trees import CasprTree
 from cdpr_drake.formats.mechanism_exchange import export_mechanism, import_mechanism
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
-from tests.formats import foreign_files as files
-from tests.formats.tree_files import Cable, Link, Model, at_start, two_link
 from tests.messages import printed
+from tests.models.formats import foreign_files as files
+from tests.models.formats.tree_files import Cable, Link, Model, at_start, two_link
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 

@@ -24,8 +24,8 @@ from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_in_plant import add_robot, find_robot
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.assembly import add_cable_robot
-from tests.formats.foreign_files import REPRAP, saved
-from tests.formats.unusual_robots import ALL, exported, made, written
+from tests.models.formats.foreign_files import REPRAP, saved
+from tests.models.formats.unusual_robots import ALL, exported, made, written
 
 EXACT = 1e-12
 """Text has all digits; rotations round a few times."""

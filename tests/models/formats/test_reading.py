@@ -18,9 +18,10 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import cable_lengths
 from cdpr_drake.models.foreign_text import read_json
-from tests.formats import foreign_files as files
-from tests.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, saved, words
-from tests.formats.rich_files import (
+from tests.messages import printed
+from tests.models.formats import foreign_files as files
+from tests.models.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, saved, words
+from tests.models.formats.rich_files import (
     MJCF,
     SDF,
     SITES,
@@ -31,8 +32,7 @@ from tests.formats.rich_files import (
     slid,
     urdf,
 )
-from tests.formats.test_refusals import FIRST, MESH, SHELL, WHOLE, attachment, toy
-from tests.messages import printed
+from tests.models.formats.test_refusals import FIRST, MESH, SHELL, WHOLE, attachment, toy
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 

@@ -23,7 +23,7 @@ from cdpr_drake.formats.caspr_trees import (
 )
 from cdpr_drake.formats.mechanism_exchange import import_mechanism
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
-from tests.formats.tree_files import BOX, Cable, Link, Model, at_start, pair, two_link
+from tests.models.formats.tree_files import BOX, Cable, Link, Model, at_start, pair, two_link
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 

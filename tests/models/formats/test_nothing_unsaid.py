@@ -13,8 +13,8 @@ from cdpr_drake.errors import RobotFileError
 from cdpr_drake.formats import caspr, gazebo_yaml, mjcf, named_frames
 from cdpr_drake.formats.caspr_trees import read_tree
 from cdpr_drake.formats.detection import read_foreign
-from tests.formats import foreign_files, rich_files
-from tests.formats.tree_files import pair, two_link
+from tests.models.formats import foreign_files, rich_files
+from tests.models.formats.tree_files import pair, two_link
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 

@@ -17,8 +17,9 @@ from cdpr_drake.formats.robot_exchange import export_robot
 from cdpr_drake.formats.robot_exports import EXPORTS, HELD, export_omissions, given_fields
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import Text, settings
-from tests.formats.meanings import fields_that_differ, schema_keys
-from tests.formats.unusual_robots import (
+from tests.messages import printed
+from tests.models.formats.meanings import fields_that_differ, schema_keys
+from tests.models.formats.unusual_robots import (
     ALL,
     NAMES,
     UNUSUAL,
@@ -28,7 +29,6 @@ from tests.formats.unusual_robots import (
     robot_with_everything,
     written,
 )
-from tests.messages import printed
 from tests.motion.small_robots import MOTIONS, small_robot
 
 pytestmark = pytest.mark.usefixtures("in_this_process")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.formats.tree_files import Cable, Link, Model
+from tests.models.formats.tree_files import Cable, Link, Model
 
 EXITS = np.array(
     [

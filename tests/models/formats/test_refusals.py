@@ -7,7 +7,7 @@ from cdpr_drake.errors import RobotFileError
 from cdpr_drake.formats.caspr import read_caspr
 from cdpr_drake.formats.detection import read_foreign
 from cdpr_drake.formats.mechanism_exchange import import_mechanism
-from tests.formats.foreign_files import (
+from tests.models.formats.foreign_files import (
     ANCHORS,
     EXITS,
     KLIPPER,
@@ -24,8 +24,8 @@ from tests.formats.foreign_files import (
     wirex,
     words,
 )
-from tests.formats.rich_files import HEAVY, SDF, SLIDER, hung, joined, slid, urdf
-from tests.formats.tree_files import two_link
+from tests.models.formats.rich_files import HEAVY, SDF, SLIDER, hung, joined, slid, urdf
+from tests.models.formats.tree_files import two_link
 
 pytestmark = pytest.mark.usefixtures("in_this_process")
 
