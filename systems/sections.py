@@ -22,6 +22,10 @@ SECTIONS = {
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
+    "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
+    "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
+    "tension_control.force_control": "cdpr_drake.sections.force_control.section:ForceControl",
+    "tension_control.predictive": "cdpr_drake.sections.predictive.section:PredictiveSettings",
 }
 """Module and class of each section, by the place of its key in scenarios."""
 
@@ -42,11 +46,14 @@ class Section:
         columns: By the names of the quantities that it logs: what their numbers are called in
             `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
+        outside: True if a process outside closes the loop. The block in whose place it stands
+            has an attribute `outside`, its place, which a run hands to `Follow.connect`.
     """
 
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
     report: ClassVar[str] = ""
+    outside: ClassVar[bool] = False
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """What its settings cannot be together, or with robot and scenario; see `Scope`."""
@@ -61,6 +68,35 @@ class Section:
 
         Returns:
             A `FeatureServo`; None: the law alone, or what another section makes.
+        """
+        return None
+
+    def needs_plant(self, scenario: Any) -> bool:
+        """Whether the engine plant alone can run a scenario that has it."""
+        return False
+
+    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Callable[..., Any]]:
+        """Makers of blocks of dynamic control in the place of the usual ones.
+
+        Args:
+            settings: The `TensionControlSettings` of a run, with the usual makers.
+            robot: The robot.
+
+        Returns:
+            By the fields `controller` and `distributor` of these settings, which say what makers
+            take and what a block may offer.
+        """
+        return {}
+
+    def tension_loop(self, control: Any) -> Callable[[Any, float], Any] | None:
+        """A loop that steps dynamic control in the place of its diagram.
+
+        Args:
+            control: The `TensionControl` with the blocks that the section has made.
+
+        Returns:
+            Makes the loop of the control and the rate of its log [Hz]: `TensionRows` with a `name`
+            for the summary, `time`, `advance_to`, `pose` and `errors`. None: a diagram.
         """
         return None
 

@@ -30,7 +30,6 @@ from cdpr_drake.systems.diagrams.torque_control import (
 )
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.estimators.geometry_learner import GeometryLearner
-from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sections import sections_of
@@ -172,8 +171,8 @@ def add_visual_servo(
     for port, source in sight.items():
         builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
-    if isinstance(servo, RemoteServo):
-        for port in ("tensions", "lengths"):
+    for port in ("tensions", "lengths"):
+        if servo.HasInputPort(port):
             builder.Connect(robot.GetOutputPort(port), servo.GetInputPort(port))
     corrector, velocities = add_tension_corrector(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,

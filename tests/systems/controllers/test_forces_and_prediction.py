@@ -18,9 +18,9 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.horizon import EFFORT, TIME_CONSTANT, Horizon, View
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.sections.predictive.section import PredictiveTensions
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.plant_following import MotorFollower
-from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import (

@@ -6,7 +6,7 @@ import yaml
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, PlanningError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
+from cdpr_drake.sections.predictive.section import PredictiveTensions
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled

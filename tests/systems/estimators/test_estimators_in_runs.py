@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cdpr_drake.sections.wrench_estimation.section import reading_error
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
@@ -15,7 +14,11 @@ from cdpr_drake.estimation.wrench_observers import OBSERVERS
 from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
-from cdpr_drake.sections.wrench_estimation.section import WrenchEstimation, WrenchEstimator
+from cdpr_drake.sections.wrench_estimation.section import (
+    WrenchEstimation,
+    WrenchEstimator,
+    reading_error,
+)
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.estimators.length_estimator import EncoderLengths
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
