@@ -75,7 +75,7 @@ class Section:
         """Whether the engine plant alone can run a scenario that has it."""
         return False
 
-    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Callable[..., Any]]:
+    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Any]:
         """Makers of blocks of dynamic control in the place of the usual ones.
 
         Args:

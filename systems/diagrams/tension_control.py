@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -299,10 +298,10 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
-    for system, port in product((control, distribution), ("tensions", "lengths")):
-        if system.HasInputPort(port):
-            source = distribution if port == "tensions" else driven
-            builder.Connect(source.GetOutputPort(port), system.GetInputPort(port))
+    for port, source in (("tensions", distribution), ("lengths", driven)):
+        for decider in (control, distribution):
+            if decider.HasInputPort(port):
+                builder.Connect(source.GetOutputPort(port), decider.GetInputPort(port))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
         brake = settings.damping.block(in_plant)

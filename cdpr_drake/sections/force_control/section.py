@@ -1,6 +1,6 @@
 """Section `force_control` of dynamic control, and its block: laws that answer forces."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any, ClassVar
 
@@ -162,9 +162,7 @@ class ForceControl(Section):
         """Always: no kernel has its laws."""
         return True
 
-    def tension_blocks(
-        self, settings: Any, robot: Robot
-    ) -> Mapping[str, Callable[..., PoseTracking]]:
+    def tension_blocks(self, settings: Any, robot: Robot) -> Mapping[str, Any]:
         """Makes a `ForceTracking`."""
         about = {"rate": settings.rate, "cables": settings.believed_cables}
         return {"controller": partial(ForceTracking, settings=self, **about)}

@@ -1,6 +1,6 @@
 """Section `predictive` of dynamic control, and its block: a program over the time ahead."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any
 
@@ -56,9 +56,7 @@ class PredictiveSettings(Section):
             found = f"{scenario.controller.balance} beside predictive"
             yield "/controller.balance", found, WRENCH
 
-    def tension_blocks(
-        self, settings: Any, robot: Robot
-    ) -> Mapping[str, Callable[..., TensionDistributor]]:
+    def tension_blocks(self, settings: Any, robot: Robot) -> Mapping[str, Any]:
         """Makes a `PredictiveDistributor`."""
         view = None
         if self.mount is not None and self.points is not None:

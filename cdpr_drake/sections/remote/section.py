@@ -63,7 +63,7 @@ class RemoteSettings(Section):
             robot=model.robot, place=self.place, X_CdO=model.X_CdO,
         )  # fmt: skip
 
-    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Callable[..., Any]]:
+    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Any]:
         """A `RemoteDistributor` or a `RemoteTracking`."""
         if self.place == DISTRIBUTOR:
             return {"distributor": partial(RemoteDistributor, trajectory=settings.trajectory)}

@@ -81,7 +81,7 @@ def test_tension_control(inside, engine, place):
     assert run.outcome == Outcome.COMPLETED
     assert run.loop == ("diagram" if engine == "plant" else "remote")
     assert_same_log(run, inside[engine])
-    report = run.built.remote.report()
+    report = run.built.outside.report()
     assert report["exchanges"] == (50 if place == "distributor" else 51)  # and the log's last row
     assert report["codec"] == codec
 

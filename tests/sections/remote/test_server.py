@@ -197,7 +197,7 @@ def test_a_silent_client(pace, timeout, raw):
         assert run.sim_time == pytest.approx(1e-3)
     else:
         assert run.sim_time < 60.0
-        assert run.built.remote.report()["held_steps"] > 0
+        assert run.built.outside.report()["held_steps"] > 0
 
 
 def test_stop_by_the_client():
@@ -269,7 +269,7 @@ def test_strangers_are_answered_and_change_nothing():
     run, end = served(drive)
     assert run.outcome == Outcome.COMPLETED, end
     assert end["outcome"] == "completed"
-    assert run.built.remote.report()["services"] == 3
+    assert run.built.outside.report()["services"] == 3
 
 
 def test_nobody_comes_nowhere_to_listen_and_nobody_serves():
@@ -338,7 +338,7 @@ def test_in_real_time_a_command_holds_until_the_next():
     assert set(commanded) <= {3.0, 5.0}
     assert np.all(np.diff(commanded) >= 0.0)
     assert np.count_nonzero(commanded == 3.0) > 1
-    report = run.built.remote.report()
+    report = run.built.outside.report()
     assert report["held_steps"] > 0
     assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1
 
