@@ -21,7 +21,6 @@ from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
 from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
 from .analyses.runs.along import assess_run as assess_run
-from .analyses.runs.reactions import compare_reactions as compare_reactions
 from .analyses.runs.run import Run as Run
 from .analyses.runs.scenarios import load_scenario as load_scenario
 from .analyses.runs.seeds import repeat_run as repeat_run
@@ -58,6 +57,7 @@ from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names
 from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
+from .sections.emergency.reactions import compare_reactions as compare_reactions
 from .sections.remote.client import RemoteClient as RemoteClient
 from .sections.remote.serve import serve as serve
 from .servoing.servo_law import ServoLaw as ServoLaw

@@ -11,6 +11,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.models.cable_schema import given_material
 from cdpr_drake.models.formats.assumptions import CompletedDraft, complete_draft
 from cdpr_drake.models.formats.caspr_writer import write_caspr
 from cdpr_drake.models.formats.detection import read_foreign
@@ -24,7 +25,6 @@ from cdpr_drake.models.formats.maslow import write_maslow
 from cdpr_drake.models.formats.mjcf import write_mjcf
 from cdpr_drake.models.formats.reprapfirmware import write_reprapfirmware
 from cdpr_drake.models.formats.wirex import write_wirex
-from cdpr_drake.models.materials import given_material
 from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
 from cdpr_drake.models.robot_holding import lengths_at_home

@@ -21,6 +21,8 @@ SECTIONS = {
     "visual_servo.wrench_estimation": (
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
+    "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
+    "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
     "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",

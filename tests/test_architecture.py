@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import pytest
 
+from cdpr_drake.systems.sections import SECTIONS
+
 ROOT = Path(__file__).parent.parent
 TOP = ("cdpr_drake", "models", "systems", "analyses")
 
@@ -151,6 +153,55 @@ def test_files_have_no_circles():
                 needs.add(f"{module}.{what}" if f"{module}.{what}" in FILES else module)
         graph[name] = needs - {name}
     assert len(list(TopologicalSorter(graph).static_order())) == len(FILES)
+
+
+CORE_WITH_SCENARIOS = ("cdpr_drake.systems", "cdpr_drake.analyses.runs")
+"""Where scenarios are read, wired and run: what would name a section if it were not a plug-in."""
+
+TABLES = {"cdpr_drake.systems.sections", "cdpr_drake.cli.commands"}
+"""What lists sections and their verbs, as strings."""
+
+
+def names_of_sections(path, keys):
+    """What of a file names a section: settings' attributes, and strings that begin with a key."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Attribute) and node.attr in keys:
+            base = ast.unparse(node.value).rpartition(".")[2]
+            if base in ("scenario", "settings", "whole", "camera", "sensors", "suite"):
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) == "getattr":
+            if isinstance(node.args[1], ast.Constant) and node.args[1].value in keys:
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+        elif isinstance(node, ast.Yield) and isinstance(node.value, ast.Tuple):
+            key = node.value.elts[0]
+            if isinstance(key, ast.Constant) and str(key.value).split(".")[0] in keys:
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+
+
+def test_the_core_names_no_section():
+    """A section of a scenario hangs on by its row; no other file knows it."""
+    keys = {place.rpartition(".")[2] for place in SECTIONS}
+    named = []
+    for name, path in FILES.items():
+        if name.startswith("cdpr_drake.sections") or name in TABLES:
+            continue
+        wing = name.startswith(("cdpr_drake.analyses.studies", "cdpr_drake.studio"))
+        if not wing:
+            named += [f"{name}: {module}" for module, _ in read(name).imports
+                      if module.startswith("cdpr_drake.sections")]  # fmt: skip
+        if name.startswith(CORE_WITH_SCENARIOS):
+            named += [f"{name}: {words}" for words in names_of_sections(path, keys)]
+    assert not named, "\n".join(named)
+
+
+@pytest.mark.parametrize("words", [
+    "if scenario.stability: pass", "getattr(scenario, 'stability', None)",
+    "def f():\n    yield 'stability.threshold', 1, 2",
+])  # fmt: skip
+def test_a_file_that_names_a_section_is_found(tmp_path, words):
+    path = tmp_path / "core.py"
+    path.write_text(words)
+    assert list(names_of_sections(path, {"stability"}))
 
 
 def test_modules_that_declare_settings_have_no_postponed_annotations():

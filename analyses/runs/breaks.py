@@ -1,6 +1,6 @@
 """What becomes of a platform after a cable broke: how far it goes, how fast, and until when.
 
-And the reactions that are compared by that, as sections `emergency`:
+And the reactions that are compared by that:
 
 * none: nobody knows;
 * stop: brakes of all winches close, `BRAKE` after they are told;
@@ -31,18 +31,6 @@ BRAKE = 0.03
 
 NONE, STOP, REDISTRIBUTE, FOUND = "none", "stop", "redistribute", "found"
 CONTINUE, BRAKING, RETREAT, DESCEND = "continue", "brake", "retreat", "descend"
-
-REACTIONS = {
-    NONE: "null",
-    STOP: f"{{reaction: stop, delay: {BRAKE:g}}}",
-    REDISTRIBUTE: "{reaction: redistribute}",
-    FOUND: "{reaction: redistribute, known: found}",
-    CONTINUE: "{reaction: redistribute, motion: continue}",
-    BRAKING: "{reaction: brake}",
-    RETREAT: "{reaction: retreat}",
-    DESCEND: "{reaction: descend}",
-}
-"""Section `emergency` of each reaction."""
 
 SAVING = (STOP, REDISTRIBUTE, BRAKING, RETREAT, DESCEND)
 """Those that need neither a detector nor a goal of a servo, see `workspaces.break_survival`."""

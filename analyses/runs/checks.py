@@ -8,8 +8,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.controllers.torque_settings import TORQUE
 from cdpr_drake.systems.diagrams.pan_tilt import aimed_mounting
-from cdpr_drake.systems.diagrams.torque_control import TORQUE
 from cdpr_drake.systems.robots.cable_robot import (
     SEMI_IMPLICIT,
     STEP_SHARE,

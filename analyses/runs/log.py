@@ -270,8 +270,7 @@ _PER_CABLE = {
     "cable_velocities": "m_s", "tensions": "n", "lengths": "m", "unstrained_lengths": "m",
     "slack": "flag", "surplus_lengths": "m", "measured_tensions": "n", "measured_lengths": "m",
     "tension_corrections": "m_s", "tension_thresholds": "n", "applied_torques": "nm",
-    "friction_torques": "nm", "broken": "flag", "found_broken": "flag", "left_out": "flag",
-    "break_residuals": "m",
+    "friction_torques": "nm", "broken": "flag",
 }  # fmt: skip
 
 

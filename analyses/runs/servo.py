@@ -16,7 +16,6 @@ from pydrake.systems.analysis import SimulatorStatus
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.thinning import by_pieces
 from cdpr_drake.analyses.runs import servo_figures as drawn
-from cdpr_drake.analyses.runs.adaptation import LEARNT_POINTS
 from cdpr_drake.analyses.runs.checks import (
     check_length,
     check_start,
@@ -116,7 +115,7 @@ class TorqueSteps:
 
 SUBJECTS = (
     MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, DISTURBANCES, FAILURES,
-    LEARNT_POINTS, PAN_TILT, WORLD, STABILITY,
+    PAN_TILT, WORLD, STABILITY,
 )  # fmt: skip
 """Subjects of runs of visual servos, in the order of their numbers in a summary."""
 

@@ -42,7 +42,6 @@ from cdpr_drake.analyses.frame.figures import new_figure, plain_numbers
 from cdpr_drake.analyses.runs.breaks import (
     BRAKE,
     NONE,
-    REACTIONS,
     RESTS,
     STOP,
     after_break,
@@ -54,7 +53,8 @@ from cdpr_drake.estimation.break_detection import detectable_tension
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.palette import nth_look
-from cdpr_drake.systems.diagrams.emergency import silent_readings
+from cdpr_drake.sections.emergency.reactions import REACTIONS
+from cdpr_drake.sections.emergency.section import silent_readings
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
@@ -368,7 +368,7 @@ def limits() -> tuple[float, float]:
     assert settings is not None
     assert torque is not None
     robot = load_robot(scenario.robot)
-    limit = settings.rule(len(robot.cables)).limit(TURNED)
+    limit = settings.break_rule(len(robot.cables)).limit(TURNED)
     least = detectable_tension(
         limit, silent=float(np.max(silent_readings(scenario, settings, robot))),
         winding_per_newton=(1.0 + torque.proportional) / torque.derivative, within=IN_TIME,

@@ -1,7 +1,7 @@
 """Which single breaks of a cable a platform survives, and by which reaction, from one pose.
 
 Every single cable breaks while the platform stands at a pose, or passes it at a speed, and every
-reaction of section `emergency` follows, told at once. All of them start from the same state and are
+reaction follows, told at once. All of them start from the same state and are
 moved together by `BatchRobots`; the controller of motor torques is the law that `TorqueController`
 calls, with what it reads known without error, and reactions act at the instants at which
 `EmergencyReaction` and `TorqueController` act in a diagram.
@@ -44,15 +44,15 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.batches.batch_robots import BatchRobots, BatchState
-from cdpr_drake.systems.controllers.emergency import (
-    EmergencySettings,
+from cdpr_drake.systems.controllers.break_reactions import (
+    ReactionRule,
     WaysOut,
     descent_twist,
     retreat_twist,
+    ways_out,
 )
-from cdpr_drake.systems.controllers.torque_settings import TorqueControl
-from cdpr_drake.systems.diagrams.emergency import ways_out
-from cdpr_drake.systems.diagrams.torque_control import TORQUE, torque_law, wanted_limits
+from cdpr_drake.systems.controllers.torque_settings import TORQUE, TorqueControl
+from cdpr_drake.systems.diagrams.torque_control import torque_law
 from cdpr_drake.systems.robots.cable_robot import automatic_step
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
@@ -60,10 +60,8 @@ from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.tensions.methods import method_for
 from cdpr_drake.winches.failed_winches import HOLD
 
-RULES = {
-    name: EmergencySettings(reaction=name, delay=BRAKE if name == STOP else 0.0) for name in SAVING
-}
-"""Section `emergency` of each reaction."""
+RULES = {name: ReactionRule(name, delay=BRAKE if name == STOP else 0.0) for name in SAVING}
+"""What is done by each reaction."""
 
 SETTLES = 0.3
 """For how long the platform stands before a break, so that tensions are those of the law [s]."""
@@ -233,7 +231,7 @@ class _Hung:
         self._believed = scenario.cables.cable_set(robot)
         # Brakes of a reaction hold in a diagram whatever the file says of one, and do not slip.
         self._braked = replace(robot, winch=replace(robot.winch, brake_torque=HOLD))
-        self._most = wanted_limits(settings, robot)[1]
+        self._most = settings.wanted_limits(robot)[1]
         # Without a camera: the law reads its cables alone.
         believed = BelievedRobot(self._believed, RigidTransform(), robot.home.transform())
         self._law = torque_law(settings, robot, believed, scenario)
@@ -367,7 +365,7 @@ class _Reacting:
     """
 
     def __init__(
-        self, law: TorqueServoLaw, rule: EmergencySettings, cable: int, at: _Moment,
+        self, law: TorqueServoLaw, rule: ReactionRule, cable: int, at: _Moment,
         ways: WaysOut, velocity: Array,
     ) -> None:  # fmt: skip
         self._rule, self._cable, self._ways, self._velocity = rule, cable, ways, velocity

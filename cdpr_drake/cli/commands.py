@@ -61,7 +61,7 @@ COMMANDS = {
         ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
     ),
     "reactions": Command(
-        _RUN, f"{_VERBS}.runs.reactions:compare_reactions",
+        _RUN, "cdpr_drake.sections.emergency.reactions:compare_reactions",
         "Breaks a cable of a visual servo by motor torques, once for each reaction.",
         ("cdpr reactions", "cdpr reactions --cable 3 --reactions stop,brake --camera projected"),
     ),

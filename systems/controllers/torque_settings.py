@@ -5,9 +5,13 @@ from typing import Annotated
 import numpy as np
 
 from cdpr_drake.control.torque_law import ServoWrench, TensionController
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, settings
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.winches.friction import FrictionLaw
+
+TORQUE = "torque"
+"""Mode of winches that are commanded by torque."""
 
 SLACK_SHARE, SMALLEST_SLACK = 0.4, 0.05
 """Share of the smallest wanted tension below which a cable counts as slack; at least this [N]."""
@@ -117,3 +121,11 @@ class TorqueControl:
     def servo_wrench(self, servo_rate: float) -> ServoWrench:
         """The outer loop behind a servo of that rate [Hz]."""
         return ServoWrench(mu=self.velocity_gain, kappa=self.integral_gain, period=1.0 / servo_rate)
+
+    def wanted_limits(self, robot: Robot) -> tuple[float, float]:
+        """Smallest and largest wanted tensions of a robot [N]."""
+        limits = None
+        if self.limits is not None:
+            limits = (float(self.limits[0]), float(self.limits[1]))
+        low, high = robot.tension_limits(limits)
+        return low + self.margin, high - self.margin

@@ -19,10 +19,8 @@ from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.schema.declarations import Refusal, Scope, number_words, told
 from cdpr_drake.servoing.point_features import interaction_rank
 from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE
-from cdpr_drake.systems.diagrams.adaptation import adaptation_refusals
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import make_tasks, scheme_refusals
-from cdpr_drake.systems.diagrams.emergency import emergency_refusals
 from cdpr_drake.systems.diagrams.fusion_checks import fusion_refusals
 from cdpr_drake.systems.diagrams.pan_tilt import pan_tilt_refusals
 from cdpr_drake.systems.diagrams.tension_management import management_refusals
@@ -260,9 +258,7 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     _estimators,
     fusion_refusals,
     management_refusals,
-    adaptation_refusals,
     _cables,
-    emergency_refusals,
     _winches,
     winch_group_refusals,
     torque_refusals,

@@ -12,7 +12,6 @@ from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.controllers.torque_controller import TorqueController
-from cdpr_drake.systems.diagrams.adaptation import add_geometry_learner
 from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
@@ -29,7 +28,6 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
-from cdpr_drake.systems.estimators.geometry_learner import GeometryLearner
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sections import sections_of
@@ -51,7 +49,6 @@ class VisualServoBlocks(ServoModel):
             None for others.
         corrector: Takes up slack; None unless asked for.
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
-        learner: Learns exit and anchor points; None unless asked for.
         turning: The joints of a camera that turns, and what turns them; None: it is fixed.
         prefix: What the names of the blocks begin with.
         logged: What sections log, by the names of the quantities.
@@ -66,7 +63,6 @@ class VisualServoBlocks(ServoModel):
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
     torque: TorqueController | None = None
-    learner: GeometryLearner | None = None
     turning: TurningCamera | None = None
     prefix: str = ""
     logged: dict[str, OutputPort] = field(default_factory=dict)
@@ -195,17 +191,6 @@ def add_visual_servo(
         corrector=corrector,
         torque=torque,
         turning=turning,
-        learner=add_geometry_learner(
-            builder,
-            settings,
-            robot,
-            model=model,
-            readings=readings,
-            measurement=measurement,
-            servo=servo,
-            estimated=estimator.GetOutputPort("X_WP"),
-            name=prefix + "geometry_learner",
-        ),
         prefix=prefix,
     )
     for _, section in sections_of(settings):

@@ -10,7 +10,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.pose_features import seen_pose_error
 from cdpr_drake.servoing.servo_task import BelievedRobot, CameraMounting
-from cdpr_drake.systems.controllers.adaptive_servo import AdaptiveServo
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopServo, open_loop_plan
 from cdpr_drake.systems.controllers.planned_pose_servo import PlannedPoseServo
@@ -107,8 +106,6 @@ class ServoModel:
             goals = [task.desired.transform() for task in settings.tasks()]
             way = settings.pose_plan.plan()
             return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
-        if settings.adaptation is not None:
-            return AdaptiveServo(controller, target, pinhole, rate)
         return FeatureServo(controller, target, pinhole, rate)
 
     def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:

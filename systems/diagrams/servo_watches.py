@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
@@ -15,14 +14,6 @@ from cdpr_drake.systems.diagrams.pan_tilt import turning_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.estimators.geometry_learner import (
-    ADAPTATION,
-    BELIEVED_POINTS,
-    DOUBTED,
-    LEARNT,
-    LEARNT_SIGMA,
-    OPEN_FRAMES,
-)
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
@@ -182,8 +173,6 @@ def add_servo_log(
     blocks: VisualServoBlocks,
     looking: PerceptionSensors,
     meters: WorldMeters | None,
-    *,
-    reacting: Mapping[str, OutputPort],
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
     block, servo, sight = blocks.block, blocks.servo, blocks.sight
@@ -207,9 +196,6 @@ def add_servo_log(
         ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
-    if blocks.learner is not None:
-        for name in (LEARNT, LEARNT_SIGMA, BELIEVED_POINTS, ADAPTATION, DOUBTED, OPEN_FRAMES):
-            ports[name] = blocks.learner.GetOutputPort(name)
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
     if scenario.pose_plan is not None:
@@ -231,5 +217,5 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    ports |= looking.logged | dict(reacting) | blocks.logged
+    ports |= looking.logged | blocks.logged
     return add_log(builder, ports, scenario.log_rate)

@@ -22,7 +22,7 @@ from cdpr_drake.schema.declarations import Refusal, Scope, told
 from cdpr_drake.servoing.servo_task import BelievedRobot
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.torque_controller import TorqueController
-from cdpr_drake.systems.controllers.torque_settings import SMALLEST_SLACK, TorqueControl
+from cdpr_drake.systems.controllers.torque_settings import SMALLEST_SLACK, TORQUE, TorqueControl
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
@@ -31,9 +31,6 @@ from cdpr_drake.tensions.methods import method_for
 
 if TYPE_CHECKING:
     from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-
-TORQUE = "torque"
-"""The mode of winches that this is about."""
 
 WHOLE = 1e-6
 """A period over a step that is this near to a whole number is one: decimal rates are rounded."""
@@ -51,7 +48,7 @@ def torque_refusals(scope: Scope) -> Iterator[Refusal]:
         accepted = "null: tensions are what torques are commanded for"
         yield "tension_management", "a section with winches.mode torque", accepted
     settings = scenario.torque_control or TorqueControl()
-    low, high = wanted_limits(settings, robot)
+    low, high = settings.wanted_limits(robot)
     if low > high:
         margin = settings.margin
         found = f"{margin:g} with limits {low - margin:g} to {high + margin:g} N"
@@ -118,19 +115,10 @@ def plan_refusals(scope: Scope) -> Iterator[Refusal]:
         yield "controller.free_rotation", "true with pose_plan", accepted
 
 
-def wanted_limits(settings: TorqueControl, robot: Robot) -> tuple[float, float]:
-    """Smallest and largest wanted tensions [N]."""
-    given = None
-    if settings.limits is not None:
-        given = (float(settings.limits[0]), float(settings.limits[1]))
-    low, high = robot.tension_limits(given)
-    return low + settings.margin, high - settings.margin
-
-
 def tension_limits(scenario: Scenario, robot: Robot) -> tuple[float, float]:
     """Limits of tensions [N] that a run by torque is judged by, without the margin."""
     settings = scenario.torque_control or TorqueControl()
-    low, high = wanted_limits(settings, robot)
+    low, high = settings.wanted_limits(robot)
     return low - settings.margin, high + settings.margin
 
 
@@ -155,7 +143,7 @@ def torque_law(
         cables = cables.without_pulleys()
     at_home = tension_problem(robot, robot.home.transform(), cables=cables)
     radii = winch.drum.radii(cables.count)
-    low, high = wanted_limits(settings, robot)
+    low, high = settings.wanted_limits(robot)
     bounds = np.repeat([[low], [high]], cables.count, axis=1)
     return TorqueServoLaw(
         cables,
@@ -184,7 +172,7 @@ def loop_warnings(scenario: Scenario, robot: Robot) -> list[str]:
     cables = scenario.cables.cable_set(robot)
     lengths = cable_paths(scenario.initial_pose.transform(), cables).lengths
     stiffness = float(np.max(cables.stiffness / lengths)) / STIFFEST_SHARE
-    low, _ = wanted_limits(settings, robot)
+    low, _ = settings.wanted_limits(robot)
     retardation = float(np.max(cables.retardation))
 
     def stable(proportional: float) -> bool:

@@ -16,7 +16,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.cameras.region_camera import RegionCamera
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.diagrams.camera import scene_adder
-from cdpr_drake.systems.diagrams.emergency import add_emergency
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, add_visual_servo
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.servo_watches import (
@@ -154,8 +153,7 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     looking = add_perception_sensors(
         builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
     )
-    reacting = add_emergency(builder, scenario, blocks)
-    log = add_servo_log(builder, scenario, blocks, looking, watches.meters, reacting=reacting)
+    log = add_servo_log(builder, scenario, blocks, looking, watches.meters)
     for event in () if scenario.failures is None else scenario.failures.of_sensors():
         assert event.sensor is not None
         late = event.delay if event.kind == LATE else None

@@ -1,9 +1,5 @@
 from .estimator_kinds import ESTIMATORS as ESTIMATORS
 from .estimator_kinds import EstimatorKind as EstimatorKind
 from .estimator_kinds import EstimatorTask as EstimatorTask
-from .geometry_learner import Adaptation as Adaptation
-from .geometry_learner import GeometryLearner as GeometryLearner
 from .pose_estimator import PoseEstimator as PoseEstimator
 from .pose_estimator import Read as Read
-from .recursive_calibration import Learnt as Learnt
-from .recursive_calibration import RecursiveCalibration as RecursiveCalibration

@@ -58,8 +58,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its disturbances are a block of a diagram"
     if scenario.failures is not None:
         return "its failures are a block of a diagram"
-    if scenario.adaptation is not None:
-        return "what learns its points is a block of a diagram"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
     if scenario.camera.kind != PROJECTED:

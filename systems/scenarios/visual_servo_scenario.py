@@ -10,7 +10,6 @@ from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, filled, settings
 from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
-from cdpr_drake.systems.controllers.emergency import EmergencySettings
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopSettings
 from cdpr_drake.systems.controllers.perturbation_settings import Perturbations
 from cdpr_drake.systems.controllers.planned_pose_servo import PosePlanSettings
@@ -22,7 +21,6 @@ from cdpr_drake.systems.controllers.servo_settings import (
 from cdpr_drake.systems.controllers.tension_management_settings import TensionManagement
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
-from cdpr_drake.systems.estimators.geometry_learner import Adaptation
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import (
@@ -67,11 +65,6 @@ class VisualServoSettings:
         TensionManagement | None,
         "What takes up slack beside the servo; null: nobody looks after the tensions.",
     ] = None
-    adaptation: Annotated[
-        Adaptation | None,
-        "Exit and anchor points and lengths at the start, learnt while the servo runs; "
-        "null: what is believed at the start stays.",
-    ] = None
     torque_control: Annotated[
         TorqueControl | None,
         "How winches are commanded by torque, with winches.mode torque; null: its defaults.",
@@ -97,8 +90,4 @@ class Scenario(VisualServoSettings, CableRobotSettings, ScenarioHeader):
     kind: Annotated[str, OneOf((VISUAL_SERVO,)), "Kind of run."] = VISUAL_SERVO
     stop: Annotated[StopSettings, "When the run ends."]
     integration: Annotated[IntegrationSettings, "Integration."] = filled(IntegrationSettings)
-    emergency: Annotated[
-        EmergencySettings | None,
-        "What is done when a cable has broken, beside section failures; null: nothing.",
-    ] = None
     log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake import models
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.models.exit_points import Rail
+from cdpr_drake.models.cable_schema import Rail
 from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.shapes import FrameBeam
 from tests.motion.small_robots import small_robot

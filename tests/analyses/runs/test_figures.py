@@ -10,32 +10,32 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs import servo_figures, subjects
-from cdpr_drake.analyses.runs.adaptation import (
-    LEARNT_POINTS,
-    adaptation_numbers,
-    doubts,
-    true_offsets,
-)
 from cdpr_drake.analyses.runs.sensing import SENSING, pan_tilt_numbers, reading_figure
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.calibration.identifiability import FRAMES
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import load_tension_sensor
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.pan_tilt import (
-    LOGGED_ENCODERS,
-    LOGGED_FOUND,
-    LOGGED_IMAGE,
-    LOGGED_JOINTS,
-)
-from cdpr_drake.systems.estimators.geometry_learner import (
+from cdpr_drake.sections.adaptation.geometry_learner import (
     ADAPTATION,
     ADAPTATION_PARTS,
     DOUBTED,
     LEARNT,
     LEARNT_SIGMA,
     OPEN_FRAMES,
+)
+from cdpr_drake.sections.adaptation.report import (
+    SUBJECTS,
+    adaptation_numbers,
+    doubts,
+    true_offsets,
+)
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.pan_tilt import (
+    LOGGED_ENCODERS,
+    LOGGED_FOUND,
+    LOGGED_IMAGE,
+    LOGGED_JOINTS,
 )
 from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
 from cdpr_drake.systems.sensors.sensor_settings import (
@@ -327,7 +327,7 @@ def test_no_legend_hides_numbers_that_rise_early_and_labels_are_as_long_as_axes(
     falls = np.tile(0.0117 * np.exp(-time)[:, None], (1, 7 * M))
     log = {"time": time, **learning(falls, sigma)}
     log[ADAPTATION] = np.outer(1.0 - np.exp(-3.0 * time), np.full(len(ADAPTATION_PARTS), 20.0))
-    figure = drawn_of(by_hand(log, robot=ROBOT), LEARNT_POINTS)["adaptation"]()
+    figure = drawn_of(by_hand(log, robot=ROBOT), *SUBJECTS)["adaptation"]()
     assert figure_faults(figure) == []
     curves = [figure.axes[k].lines[1].get_ydata() for k in (0, 1, 3, 4)]
     np.testing.assert_allclose(curves, np.tile(11.7 * np.exp(-time), (4, 1)), rtol=1e-9)

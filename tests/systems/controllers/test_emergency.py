@@ -14,10 +14,11 @@ from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import wrench_balance
-from cdpr_drake.systems.controllers.emergency import EmergencyReaction, EmergencySettings
+from cdpr_drake.sections.emergency.break_detector import BreakDetector
+from cdpr_drake.sections.emergency.reaction import EmergencyReaction
+from cdpr_drake.systems.controllers.break_reactions import ReactionRule
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
-from cdpr_drake.systems.monitoring.break_detector import BreakDetector
 from tests.systems.controllers.controller_cases import logged, steps_source
 
 ROBOT = load_robot("acrobot_small")
@@ -33,7 +34,7 @@ def only(which, value, others=0.0):
 
 @pytest.mark.parametrize("reaction", ["stop", "redistribute"])
 def test_a_reaction_acts_after_its_delay_on_the_cables_that_are_named(reaction):
-    block = EmergencyReaction(EmergencySettings(reaction=reaction, delay=0.055, rate=RATE), M)
+    block = EmergencyReaction(ReactionRule(reaction, delay=0.055, rate=RATE), M)
     flags = steps_source(only(2, 0.0), only(2, 1.0), times=[0.1])
     names = ("jammed", "left_out", "halted")
     times, (jammed, left_out, halted) = logged(block, {"found_broken": flags}, names, RATE)
@@ -46,7 +47,7 @@ def test_a_reaction_acts_after_its_delay_on_the_cables_that_are_named(reaction):
 
 @pytest.mark.parametrize(("reaction", "brakes"), [("redistribute", 0.0), ("stop", 1.0)])
 def test_a_cable_that_is_named_no_more_is_used_again_but_brakes_stay(reaction, brakes):
-    block = EmergencyReaction(EmergencySettings(reaction=reaction), M)
+    block = EmergencyReaction(ReactionRule(reaction), M)
     flags = steps_source(only(2, 0.0), only(2, 1.0), only(2, 0.0), times=[0.1, 0.2])
     times, (left_out, jammed) = logged(block, {"found_broken": flags}, ("left_out", "jammed"), RATE)
     named = times > 0.1 + 1e-9

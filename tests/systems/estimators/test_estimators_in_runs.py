@@ -130,7 +130,7 @@ def test_learnt_points_are_told_with_the_truth_beside_them(learnt):
     assert len(found["learnt"]) == found["directions"] == 56
     assert any("world frame" in word for word in found["open_frames"])
     assert "adaptation" in figures(learnt)
-    assert "learns its points" in diagram_reason(load_scenario(ADAPTED, SHORT))
+    assert "section adaptation adds blocks" in diagram_reason(load_scenario(ADAPTED, SHORT))
 
 
 def test_the_servo_goes_by_the_believed_points(learnt):

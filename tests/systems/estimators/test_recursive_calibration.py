@@ -13,7 +13,7 @@ from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_vector
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.estimators.recursive_calibration import (
+from cdpr_drake.sections.adaptation.recursive_calibration import (
     TAG,
     UNIT_CAMERA,
     Beforehand,

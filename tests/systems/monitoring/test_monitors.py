@@ -15,8 +15,8 @@ from cdpr_drake.estimation.failure_detection import AlarmRule
 from cdpr_drake.estimation.failure_watch import EncoderWatch, MotorWatch
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import robot_file
+from cdpr_drake.sections.emergency.failure_monitor import FailureMonitor, WatchRules
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.monitoring.failure_monitor import FailureMonitor, WatchRules
 from cdpr_drake.systems.monitoring.log_row import POSE_SIZE, LogRow
 from cdpr_drake.systems.monitoring.run_monitor import Outcome, RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch

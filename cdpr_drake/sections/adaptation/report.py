@@ -15,7 +15,7 @@ from cdpr_drake.calibration.identifiability import FRAMES
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import ESTIMATED, IDEAL
-from cdpr_drake.systems.estimators.geometry_learner import (
+from cdpr_drake.sections.adaptation.geometry_learner import (
     ADAPTATION,
     ADAPTATION_PARTS,
     DOUBTED,
@@ -186,9 +186,5 @@ def adaptation_figure(run: Run) -> Figure:
     return figure
 
 
-LEARNT_POINTS = Subject(
-    "adaptation",
-    adaptation_numbers,
-    {"adaptation": adaptation_figure},
-    applies=lambda run: LEARNT in run.log,
-)
+SUBJECTS = (Subject("adaptation", adaptation_numbers, {"adaptation": adaptation_figure}),)
+"""What a run reports of the section."""

@@ -1,11 +1,13 @@
-"""Scenario section `adaptation`, and its block: exit and anchor points learnt while servoing.
+"""The block that learns exit and anchor points while a servo runs.
 
 `recursive_calibration` does the learning; a criterion is asked before the servo gets a model.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.common.value import Value
@@ -13,17 +15,17 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.schema.declarations import In, Switch, settings
-from cdpr_drake.systems.estimators.recursive_calibration import (
+from cdpr_drake.sections.adaptation.recursive_calibration import (
     CORNER_ROWS,
-    Beforehand,
-    LearningRules,
     Learnt,
     Look,
     RecursiveCalibration,
 )
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
+
+if TYPE_CHECKING:
+    from cdpr_drake.sections.adaptation.section import Adaptation
 
 LEARNT, LEARNT_SIGMA, BELIEVED_POINTS = "learnt", "learnt_sigma", "believed_points"
 ADAPTATION, DOUBTED, OPEN_FRAMES = "adaptation", "doubted_measurements", "open_frames"
@@ -33,88 +35,6 @@ ADAPTATION_PARTS = (
     "models_believed", "models_rejected", "margin_offered", "margin_before",
 )  # fmt: skip
 """Numbers of the output `adaptation`."""
-
-
-@settings
-class Adaptation:
-    """Exit points, anchor points and lengths at the start, learnt while the servo runs."""
-
-    exit_points: Annotated[
-        float,
-        In("m", gt=0.0),
-        "Standard deviation of a coordinate of an exit point, before anything is measured.",
-    ] = 0.01
-    anchor_points: Annotated[float, In("m", gt=0.0), "The same of an anchor point."] = 0.01
-    camera_place: Annotated[
-        float,
-        In("m", ge=0.0),
-        "Standard deviation of a coordinate of the camera on the platform; 0: it is exact.",
-    ] = 0.0
-    camera_turn_deg: Annotated[float, In("deg", ge=0.0), "The same of a turn of it."] = 0.0
-    start_place: Annotated[
-        float,
-        In("m", gt=0.0),
-        "Standard deviation of a coordinate of the pose where the target is first seen, "
-        "as the estimator starts from it.",
-    ] = 0.001
-    start_turn_deg: Annotated[float, In("deg", gt=0.0), "The same of a turn of it."] = 0.1
-    length_noise: Annotated[
-        float, In("m", gt=0.0), "Standard deviation of a length that encoders count."
-    ] = 0.0001
-    pixel_noise: Annotated[
-        float, In("px", gt=0.0), "Standard deviation of a coordinate of a corner that is found."
-    ] = 0.2
-    slack_below: Annotated[float, In("N", ge=0.0), "Cables that pull less tell no length."] = 0.2
-    spacing: Annotated[
-        float, In("m", gt=0.0), "Way of the platform from one pose that counts to the next."
-    ] = 0.005
-    turn_deg: Annotated[float, In("deg", gt=0.0), "Or its turn."] = 2.0
-    window: Annotated[
-        int,
-        In(ge=2, le=1000),
-        "Poses that are linearised anew; those before them stay linearised as they were, "
-        "which makes standard deviations too small: best as many as a motion has.",
-    ] = 100
-    period: Annotated[
-        float, In("s", gt=0.0), "Time between models that are offered to the servo."
-    ] = 0.5
-    believe: Annotated[Switch, "Whether the servo gets them; else they are logged alone."] = True
-    margin: Annotated[
-        float, In("-"), "Least margin of the stability criterion of a model that is believed."
-    ] = 0.0
-    margin_loss: Annotated[
-        float,
-        In("-", ge=0.0),
-        "By how much that margin may be less than the one of the model before.",
-    ] = 0.05
-    samples: Annotated[
-        int,
-        In(ge=1, le=10000),
-        "Robots, as likely as what was measured leaves them, of each of which the "
-        "criterion must hold.",
-    ] = 16
-
-    def beforehand(self) -> Beforehand:
-        """What is known beforehand."""
-        return Beforehand(
-            exit_points=self.exit_points,
-            anchor_points=self.anchor_points,
-            camera_place=self.camera_place,
-            camera_turn=float(np.radians(self.camera_turn_deg)),
-            pose_place=self.start_place,
-            pose_turn=float(np.radians(self.start_turn_deg)),
-        )
-
-    def rules(self, focal: float) -> LearningRules:
-        """How measurements count, of a camera of a focal length [px]."""
-        return LearningRules(
-            length_sigma=self.length_noise,
-            corner_sigma=self.pixel_noise / focal,
-            spacing=self.spacing,
-            turn=float(np.radians(self.turn_deg)),
-            window=self.window,
-            slack_below=self.slack_below,
-        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,18 @@ from cdpr_drake.analyses.frame.words import (
     Switch,
     whole,
 )
-from cdpr_drake.analyses.runs.breaks import REACTIONS, after_break
+from cdpr_drake.analyses.runs.breaks import (
+    BRAKE,
+    BRAKING,
+    CONTINUE,
+    DESCEND,
+    FOUND,
+    NONE,
+    REDISTRIBUTE,
+    RETREAT,
+    STOP,
+    after_break,
+)
 from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.simulate import Camera
@@ -36,6 +47,18 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+REACTIONS = {
+    NONE: "null",
+    STOP: f"{{reaction: stop, delay: {BRAKE:g}}}",
+    REDISTRIBUTE: "{reaction: redistribute}",
+    FOUND: "{reaction: redistribute, known: found}",
+    CONTINUE: "{reaction: redistribute, motion: continue}",
+    BRAKING: "{reaction: brake}",
+    RETREAT: "{reaction: retreat}",
+    DESCEND: "{reaction: descend}",
+}
+"""Section `emergency` of each reaction."""
 
 RESULTS = "results.json"
 """File of the numbers in a results folder."""

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.systems.estimators.geometry_learner import Offer
+from cdpr_drake.sections.adaptation.geometry_learner import Offer
 from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 
 
