@@ -19,9 +19,14 @@ from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import NewFolder, RobotWord, one_of
 from cdpr_drake.analyses.programs import NOTEBOOKS
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.exit_points import split_name
 from cdpr_drake.models.mechanism_schema import Mechanism
-from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names, robot_text
+from cdpr_drake.models.robot_loader import (
+    load_robot,
+    robot_file,
+    robot_names,
+    robot_text,
+    split_name,
+)
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.json_schemas import commented_yaml, json_schema

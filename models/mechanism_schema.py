@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
-from cdpr_drake.models.robot_schema import Pose, TensionBounds
+from cdpr_drake.models.cable_schema import CableMaterial, OwnMaterial, TensionBounds, own_material
+from cdpr_drake.models.robot_schema import Pose
 from cdpr_drake.schema.declarations import (
     Direction,
     In,

@@ -34,8 +34,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import DivergedError, RobotFileError
 from cdpr_drake.geometry.platform_joint import PlatformJoint
 from cdpr_drake.geometry.poses import floating_pose_into
+from cdpr_drake.models.platform_schema import SHAPE_INERTIA
 from cdpr_drake.models.robot_loader import as_robot
-from cdpr_drake.models.robot_schema import SHAPE_INERTIA, Robot
+from cdpr_drake.models.robot_schema import Robot
 
 _LOG = logging.getLogger(__name__)
 

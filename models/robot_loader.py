@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,8 +18,7 @@ import numpy as np
 
 from cdpr_drake.errors import RobotFileError, why_not_read
 from cdpr_drake.models.camera_files import resolved_camera
-from cdpr_drake.models.exit_points import MARK, split_name
-from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
+from cdpr_drake.models.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.mechanism_files import (
     MECHANISM_FILE,
     is_mechanism,
@@ -40,6 +40,12 @@ from cdpr_drake.schema.input_files import (
 from cdpr_drake.schema.typed_yaml import closest, dump_typed, load_typed, parse_typed
 
 _FOLDER = Path(__file__).parent / "robots"
+
+MARK = "@"
+"""Between the name of a robot and where its exit points stand on their rails."""
+
+READERS = "cdpr_drake.formats.detection"
+"""Module that reads the files of other tools."""
 
 
 def robot_names() -> tuple[str, ...]:
@@ -87,6 +93,31 @@ def robot_file(name: str) -> Path:
     return _FOLDER / name / "robot.yaml"
 
 
+def split_name(words: str) -> tuple[str, dict[str, float]]:
+    """Name of a robot, and coordinates by cables, of words such as `name@C1=0.3,C2=-0.1`.
+
+    Raises:
+        RobotFileError: What stands behind the mark are no coordinates.
+    """
+    name, mark, rest = words.rpartition(MARK)
+    if not mark or "/" in rest or Path(words).exists():  # a path may have the mark in it
+        return words, {}
+    found: dict[str, float] = {}
+    for item in rest.split(","):
+        cable, equals, value = item.partition("=")
+        try:
+            number_ = float(value)
+        except ValueError:
+            number_ = np.nan
+        if not (cable.strip() and equals and np.isfinite(number_)) or cable.strip() in found:
+            raise RobotFileError(
+                f"robot {words}: found {item!r} behind {MARK}; accepted: coordinates of exit "
+                f"points on rails, each cable once, as in {name}{MARK}C1=0.3,C2=-0.1 [m]"
+            )
+        found[cable.strip()] = number_
+    return name, found
+
+
 def robot_text(name: str, asks: str = "robot_text") -> str:
     """The robot file of a robot as YAML, also where its file is one of another tool.
 
@@ -113,11 +144,8 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
 
 
 def _foreign_content(path: Path) -> str:
-    """The robot file that the file of another tool makes, as YAML; imports all readers."""
-    from cdpr_drake.models.formats.assumptions import complete_draft
-    from cdpr_drake.models.formats.detection import read_foreign
-
-    return made_of_input(path, lambda: complete_draft(read_foreign(path)).yaml())
+    """The robot file that the file of another tool makes, as YAML."""
+    return made_of_input(path, lambda: import_module(READERS).foreign_yaml(path))
 
 
 def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:

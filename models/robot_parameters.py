@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.materials import OwnMaterial
+from cdpr_drake.models.cable_schema import Cable, OwnMaterial
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_schema import Cable, Robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.typed_yaml import closest
 
 _AXES, _SIX = "xyz", ("xx", "yy", "zz", "xy", "xz", "yz")

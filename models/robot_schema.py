@@ -15,13 +15,19 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.motion_type import MOTION_TYPES, MotionType
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import ALL_ROWS, PLANAR_ROWS
-from cdpr_drake.models.exit_points import PlatformPulley, Pulley, Rail
-from cdpr_drake.models.materials import CableMaterial, OwnMaterial, own_material
+from cdpr_drake.models.cable_schema import (
+    Cable,
+    CableMaterial,
+    PlatformPulley,
+    Pulley,
+    TensionBounds,
+    own_material,
+)
+from cdpr_drake.models.platform_schema import SHAPE_INERTIA, Platform, PlatformDamping
 from cdpr_drake.models.robot_refusals import robot_refusals
-from cdpr_drake.models.shapes import FITS, Frame, PlatformShape
+from cdpr_drake.models.shapes import Frame
 from cdpr_drake.models.winch_schema import Winch
 from cdpr_drake.schema.declarations import (
-    LONGEST,
     Direction,
     In,
     Name,
@@ -31,7 +37,6 @@ from cdpr_drake.schema.declarations import (
     Scope,
     Text,
     filled,
-    number_words,
     settings,
     values,
 )
@@ -43,12 +48,6 @@ if TYPE_CHECKING:  # statics need none of them
     from cdpr_drake.winches.drum import Drum
     from cdpr_drake.winches.groups import WinchGroups
     from cdpr_drake.winches.motor import WinchLaw
-
-BOX_INERTIA, SHAPE_INERTIA = "box", "shape"
-
-
-TRIANGLE_ROUNDING = 1e-15
-"""Moments of inertia of a plate meet the triangle inequality exactly, up to rounding."""
 
 
 @settings
@@ -63,180 +62,6 @@ class Pose:
     def transform(self) -> RigidTransform:
         """The pose as a RigidTransform."""
         return pose_from_angles(self.position, np.radians(self.angles_deg))
-
-
-@settings
-class HysteresisSettings:
-    """Friction against turns of the platform, in what it hangs on; see
-    `dynamics.contact_hysteresis`."""
-
-    tilt: Annotated[
-        float,
-        In("N m/rad", ge=0.0, le=1000000.0),
-        "Stiffness of contacts that stick, about x and y of P.",
-    ] = 0.0
-    turn: Annotated[float, In("N m/rad", ge=0.0, le=1000000.0), "The same about z of P."] = 0.0
-    slip: Annotated[
-        float,
-        In("rad", ge=0.0001, le=10.0),
-        "Turn at which contacts slip; the largest moment is this times the stiffness.",
-    ] = 0.1
-
-    def contacts(self) -> "ContactHysteresis":
-        """These numbers as the law takes them."""
-        from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
-
-        return ContactHysteresis(tilt=self.tilt, turn=self.turn, slip=self.slip)
-
-
-@settings
-class Platform:
-    """The moving platform; its frame P lies at the middle of the bottom face, z up, unless
-    `box_center` says otherwise."""
-
-    mass: Annotated[float, In("kg", gt=0.0, le=1e7), "Mass."]
-    size: Annotated[
-        np.ndarray, In("m", 3, gt=0.0, le=LONGEST), "Edges of its box along x, y, z of P."
-    ]
-    box_center: Annotated[
-        np.ndarray | None,
-        In("m", 3),
-        "Middle of the box in P, its edges along the axes of P; null: half its height above Po.",
-    ] = None
-    center_of_mass: Annotated[
-        np.ndarray | None,
-        In("m", 3),
-        "Centre of mass in P; null: the middle of the box, of a point mass Po.",
-    ] = None
-    inertia: Annotated[
-        np.ndarray | None,
-        In("kg m^2", 6),
-        "Moments (xx, yy, zz) and products (xy, xz, yz) of inertia about the centre of "
-        "mass, axes of P; null: those of a solid box.",
-    ] = None
-    shape: Annotated[
-        PlatformShape | None,
-        "Its shape, drawn in the place of the box, in which it lies; null: the box.",
-    ] = None
-    inertia_of: Annotated[
-        str,
-        OneOf((BOX_INERTIA, SHAPE_INERTIA)),
-        "What a homogeneous body of its mass has of an inertia that is not given, and of "
-        "a centre of mass that is not.",
-    ] = BOX_INERTIA
-    hysteresis: Annotated[
-        HysteresisSettings | None,
-        "Friction against its turns, by Dahl, in knots, joints, ropes that bend and wires"
-        " that hang on it; null: none.",
-    ] = None
-
-    def middle(self) -> Array:
-        """Middle of the box in P, shape (3,) [m]."""
-        if self.box_center is not None:
-            return np.asarray(self.box_center, float)
-        return np.array([0.0, 0.0, self.size[2] / 2.0])
-
-    def rotational_inertia(self) -> Array:
-        """About the centre of mass, axes of P, shape (3, 3) [kg m^2]; of a box if not given."""
-        if self.inertia is None:
-            x, y, z = np.square(self.size)
-            return self.mass / 12.0 * np.diag([y + z, x + z, x + y])
-        xx, yy, zz, xy, xz, yz = self.inertia
-        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-    def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """Moments of inertia that no body has, and a shape that reaches out of the box."""
-        if self.inertia is not None:
-            least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
-            if least <= 0.0 or least + middle < most * (1.0 - TRIANGLE_ROUNDING):
-                accepted = "positive principal moments, none larger than the sum of the other two"
-                yield "inertia", number_words(self.inertia), accepted
-        is_of_shape = self.inertia_of == SHAPE_INERTIA
-        if self.shape is None and is_of_shape:
-            yield "inertia_of", "shape", "box, or a section platform.shape"
-        if self.shape is None or any(self.shape.refusals(scope)):
-            return
-        center, edges = self.middle(), np.asarray(self.size, float)
-        lowest, highest = center - edges / 2.0, center + edges / 2.0
-        slack = FITS * float(np.max(edges))
-        lower, upper = self.shape.extent(center)
-        if np.any(lower < lowest - slack) or np.any(upper > highest + slack):
-            found = f"reaching from {number_words(lower)} to {number_words(upper)} m"
-            box = f"{number_words(lowest)} to {number_words(highest)} m"
-            yield "shape", found, f"within {box}, the box, with which pulleys and clearances reckon"
-        if is_of_shape:
-            self.shape.inertia(self.mass, center)
-
-
-@settings
-class PlatformDamping:
-    """Viscous damping of the platform's motion about Po, by air, pulleys and joints."""
-
-    translation: Annotated[float, In("N s/m", ge=0.0), "Force per velocity of Po."] = 0.0
-    rotation: Annotated[float, In("N m s/rad", ge=0.0), "Moment per angular velocity."] = 0.0
-
-
-@settings
-class TensionBounds:
-    """Tensions that the robot may hold."""
-
-    lower: Annotated[float, In("N", ge=0.0), "Smallest tension."]
-    upper: Annotated[float, In("N", gt=0.0, le=1e9), "Largest tension."]
-
-    def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """Bounds with nothing between."""
-        if self.lower >= self.upper:
-            yield "", f"lower {self.lower:g}, upper {self.upper:g}", "lower < upper"
-
-
-@settings
-class Cable:
-    """One cable: where it leaves the frame and where it holds the platform."""
-
-    name: Annotated[Name, "Name, once in a robot."]
-    exit_point: Annotated[Point, "Exit point A in W."]
-    anchor_point: Annotated[Point, "Anchor point B in P."]
-    swivel_axis: Annotated[
-        Direction | None, "Swivel axis of its pulley; null: that of `pulley`."
-    ] = None
-    pulley_radius: Annotated[
-        float | None, In("m", ge=0.0), "Radius of the groove of its pulley; null: that of `pulley`."
-    ] = None
-    rail: Annotated[Rail | None, "Rail on which its exit point can be put; null: it is fixed."] = (
-        None
-    )
-    winch: Annotated[
-        Text | None,
-        "Name of its winch; cables with the same one are wound on one. Null: one of its own.",
-    ] = None
-    anchor_swivel_axis: Annotated[
-        Direction | None,
-        "Swivel axis in P of its pulley at the platform; null: that of `platform_pulley`.",
-    ] = None
-    anchor_pulley_radius: Annotated[
-        float | None,
-        In("m", ge=0.0),
-        "Radius of the groove of its pulley at the platform; null: that of "
-        "`platform_pulley`, 0 without one.",
-    ] = None
-    material: Annotated[
-        OwnMaterial | None,
-        "What it is made of where that differs from `cable`; null: nothing differs.",
-    ] = None
-    drum_radius: Annotated[
-        float | None, In("m", gt=0.0), "Radius of its drum; null: that of `winch`."
-    ] = None
-    mechanical_advantage: Annotated[
-        float,
-        In("-", ge=1.0),
-        "Parts of line side by side between exit and anchor point, a block and tackle: "
-        "line that its drum winds over length of the cable. The material is that of all "
-        "parts together; rated speeds are of cables with 1.",
-    ] = 1.0
-
-    def base_of(self, p_WA: Array) -> Array:
-        """The `exit_point` with which the cable leaves the frame at p_WA, shape (3,) [m]."""
-        return np.array(p_WA if self.rail is None else p_WA - self.rail.shift(), float)
 
 
 @settings

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from cdpr_drake.errors import DataFileError, PlanningError
-from cdpr_drake.models.exit_points import Rail
+from cdpr_drake.models.cable_schema import Rail
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.planning.reconfiguration import Rails
 from cdpr_drake.schema.declarations import In, Text, filled, settings

@@ -28,7 +28,7 @@ from cdpr_drake.identification.samples import (
     sample_winches,
 )
 from cdpr_drake.identification.smoothing import Smoother
-from cdpr_drake.models.materials import OwnMaterial
+from cdpr_drake.models.cable_schema import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.numerics.time_shift import tracker_shift

@@ -52,7 +52,7 @@ from cdpr_drake.geometry.poses import (
 )
 from cdpr_drake.identification.excitation import ExcitationTask, design_excitation
 from cdpr_drake.identification.regressor import central_parameters, six_of
-from cdpr_drake.models.materials import OwnMaterial
+from cdpr_drake.models.cable_schema import OwnMaterial
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot

@@ -55,10 +55,11 @@ from cdpr_drake.identification.swings import (
     SwingTask,
     fit_swings,
 )
-from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
+from cdpr_drake.models.cable_schema import BehaviourSettings, OwnMaterial
+from cdpr_drake.models.platform_schema import HysteresisSettings
 from cdpr_drake.models.robot_dynamics import dynamic_model, platform_size
 from cdpr_drake.models.robot_loader import as_robot
-from cdpr_drake.models.robot_schema import HysteresisSettings, Robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose, rigid_platform
 
 if TYPE_CHECKING:

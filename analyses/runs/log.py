@@ -265,8 +265,7 @@ _PARTS = {
     "found": ("flag",), "gain": ("per_s",), "feasible": ("flag",), "failures": ("count",),
     "servo_mode": ("image_flag", "switches", "l_pose", "l_image", "pose_bound", "image_bound"),
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
-    "desired_wrench": _WRENCH, "applied_wrench": _WRENCH, "wrench_estimated": _WRENCH,
-    "displacement": ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
+    "desired_wrench": _WRENCH, "applied_wrench": _WRENCH,
     "contact_force": ("x_n", "y_n", "z_n"), "contact_count": ("count",),
 }  # fmt: skip
 _PER_CABLE = {

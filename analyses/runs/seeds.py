@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -386,6 +387,7 @@ def with_seeds(scenario: Scenario, seeds: Sequence[int]) -> list[Scenario]:
 def run_many(
     scenarios: Sequence[Scenario], workers: int | str | None = None, *, traces: bool = False,
     folder: Folder | None = None, follow: Follow = NOBODY,
+    remarks: Callable[[], None] = lambda: None,
 ) -> Repetition:  # fmt: skip
     """Simulates visual servos, each until its outcome is known or its duration is over.
 
@@ -399,6 +401,7 @@ def run_many(
         folder: Open results folder for runs of one scenario: a run whose record is there is not
             repeated.
         follow: Who follows.
+        remarks: Called when the first run has ended, so that a refusal of the workers is alone.
 
     Raises:
         CdprError: No scenario can be built.
@@ -414,10 +417,13 @@ def run_many(
                 records[index] = record
     jobs = [pair for pair in enumerate(scenarios) if pair[0] not in records]
     count, problems = Count(follow, len(scenarios), len(records)), list[Exception]()
-    for finished in finished_jobs(
+    ended = finished_jobs(
         partial(_record, traces=traces), jobs, workers, stop=follow.stop, say=follow.say,
         name="run",
-    ):  # fmt: skip
+    )  # fmt: skip
+    first = list(islice(ended, 1))
+    remarks()
+    for finished in chain(first, ended):
         index, scenario = jobs[finished.number]
         if finished.problem is not None:
             problems.append(finished.problem)
@@ -490,10 +496,10 @@ def repeat_run(
     del arguments["scenario"]["seed"]
     below = None if follow.results is None else follow.results.parent / "runs"
     with results_folder(loaded.name, arguments, folder, overwrite, below, True) as results:
-        say_remarks(note, warnings, follow)
         runs = run_many(
-            with_seeds(loaded, seeds), workers, traces=True, folder=results, follow=follow
-        )
+            with_seeds(loaded, seeds), workers, traces=True, folder=results, follow=follow,
+            remarks=partial(say_remarks, note, warnings, follow),
+        )  # fmt: skip
         if results is None:
             return runs
         runs = replace(runs, folder=results.path)

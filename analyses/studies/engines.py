@@ -42,7 +42,7 @@ from cdpr_drake.systems.robots.compiled_motion import HELD
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import COMPILED, PLANT, CableRobotSettings, CableSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL, robot_scenario_names, scenario_kind
-from cdpr_drake.systems.scenarios.run_settings import has_contact
+from cdpr_drake.systems.scenarios.run_settings import has_contact, needs_plant
 
 LONGEST = 120.0
 """Simulated time after which scenarios of hours are compared [s]."""
@@ -371,7 +371,7 @@ def cases(form: Form) -> Iterator[Case]:
     """Scenarios, taut motions and impacts over seeds, orders by what cables do, steps."""
     for name in QUICK_SCENARIOS if form.quick else robot_scenario_names():
         scenario = load_scenario(name)
-        if has_contact(scenario) or getattr(scenario, "plant_alone", False):
+        if has_contact(scenario) or needs_plant(scenario):
             continue  # the compiled engine has no contact and no pushes: nothing to compare
         changes = [f"duration={LONGEST}"] if scenario.duration > LONGEST else []
         if form.quick and scenario_kind(name) != TENSION_CONTROL:

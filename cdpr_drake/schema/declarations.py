@@ -53,8 +53,10 @@ def settings(kind: Any = None, *, repr: bool = True) -> Any:
     if own.startswith(f"{kind.__name__}("):  # what `dataclass` writes where there is nothing
         own = f"{kind.__name__}."
     fields = settings_of(made).values()
-    listed = "".join(f"\n    {one.name}: {one.doc} Accepted: {one.accepts()}." for one in fields)
+    listed = "".join(f"\n    {one.name}: {one.help()}" for one in fields)
     made.__doc__ = f"{own}\n\n{_FIELDS}{listed}"
+    this = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    made.__init__.__signature__ = inspect.Signature([this, *(one.parameter() for one in fields)])
     return made
 
 
@@ -297,7 +299,7 @@ Switch = Annotated[bool, _SwitchRule()]
 Text = Annotated[str, _TextRule()]
 """Any text without control characters."""
 
-Name = Annotated[str, _TextRule(NAME, "1 to 64 letters, digits, _ . -, the first one no .")]
+Name = Annotated[str, _TextRule(NAME, "1 to 64 letters, digits, _ . -, the first one no dot")]
 """A name that may become that of a file: no folders, no dots at its start."""
 
 
@@ -373,6 +375,23 @@ class Setting:
             words = f"a list of {of}" if self.many is list else f"a mapping from names to {of}"
         return words + " or null" * self.nullable
 
+    def help(self) -> str:
+        """What it means and accepts, in two sentences."""
+        return f"{self.doc} Accepted: {self.accepts().removesuffix('.')}."
+
+    def parameter(self) -> inspect.Parameter:
+        """A keyword argument for `help`: plain type, and default, ... where that is a section."""
+        kind: Any = self.type
+        if self.many:
+            kind = list[kind] if self.many is list else dict[str, kind]
+        default = inspect.Parameter.empty if self.required else self.default
+        return inspect.Parameter(
+            self.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            annotation=kind | None if self.nullable else kind,
+            default=... if dataclasses.is_dataclass(default) else default,
+        )
+
 
 _KNOWN: dict[type, dict[str, Setting]] = {}
 
@@ -415,7 +434,8 @@ class Scope:
     """What is round a section, for its `refusals`.
 
     A class of settings may have a method `refusals(scope)` that yields what no single field can
-    tell: a `Refusal` for each thing that its fields together, or with the scope, cannot be.
+    tell: a `Refusal` for each thing that its fields together, or with the scope, cannot be. If it
+    raises, that is passed over where it or a section within it refuses something, else raised.
 
     Attributes:
         whole: The settings of the whole file.

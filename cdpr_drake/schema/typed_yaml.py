@@ -332,10 +332,16 @@ class _Problems:
             self.add(place, self._words(error), error["type"] in _UNKNOWN)
 
     def add_refusals(self, settings: Any, scope: Scope, within: Place = ()) -> None:
-        """What sections refuse."""
+        """What sections refuse.
+
+        An exception of a section is raised, unless the section or one within it refuses something:
+        it may follow from that. Sections are asked in any order, so all of them are asked before.
+        """
         asked = [(at, each.refusals) for at, each in _sections(settings, within)
                  if hasattr(each, "refusals")]  # fmt: skip
         asked += [(within, more) for more in scope.more]
+        refused: list[Place] = []
+        raised: list[tuple[Place, Exception]] = []
         for place, refusals in asked:
             try:
                 for key, found, accepted in refusals(scope):
@@ -343,12 +349,16 @@ class _Problems:
                     at = within if key.startswith("/") else place
                     at = (*at, *(int(part) if part.isdecimal() else part for part in parts))
                     self.add(at, f"found {found}; accepted: {accepted}" if accepted else str(found))
+                    refused.append(at)
             except self._error as problem:  # of a file that a section names
+                refused.append(place)
                 for words in problem.problems:
                     self.note(words)
-            except Exception:  # may follow from what is said already
-                if not self._said:
-                    raise
+            except Exception as exception:
+                raised.append((place, exception))
+        for place, cause in raised:
+            if not any(at[: len(place)] == place for at in refused):
+                raise cause
 
     def _words(self, error: Any) -> str:
         section, setting = _owner(self.schema, error["loc"])

@@ -2,10 +2,15 @@ from .adaptation.geometry_learner import GeometryLearner as GeometryLearner
 from .adaptation.recursive_calibration import Learnt as Learnt
 from .adaptation.recursive_calibration import RecursiveCalibration as RecursiveCalibration
 from .adaptation.section import Adaptation as Adaptation
+from .disturbances.section import Disturbances as Disturbances
+from .disturbances.section import DisturbanceSettings as DisturbanceSettings
+from .disturbances.section import Push as Push
 from .emergency.break_detector import BreakDetector as BreakDetector
 from .emergency.failure_monitor import FailureMonitor as FailureMonitor
 from .emergency.reaction import EmergencyReaction as EmergencyReaction
 from .emergency.section import EmergencySettings as EmergencySettings
+from .force_control.section import ForceControl as ForceControl
+from .force_control.section import ForceTracking as ForceTracking
 from .pan_tilt.section import CameraPanTilt as CameraPanTilt
 from .perception.depth_sensor import DepthSensor as DepthSensor
 from .perception.head import PanTilt as PanTilt
@@ -16,6 +21,8 @@ from .perception.section import PanTiltSettings as PanTiltSettings
 from .perception.section import RangeSettings as RangeSettings
 from .perception.wheel_odometry import WheelModel as WheelModel
 from .perception.wheel_odometry import WheelOdometry as WheelOdometry
+from .predictive.section import PredictiveDistributor as PredictiveDistributor
+from .predictive.section import PredictiveSettings as PredictiveSettings
 from .stability.section import StabilitySettings as StabilitySettings
 from .stability.section import StabilityWatch as StabilityWatch
 from .wrench_estimation.section import WrenchEstimation as WrenchEstimation

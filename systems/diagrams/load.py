@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.control.force_balance import FORCE, WRENCH, force_problem
+from cdpr_drake.control.force_balance import FORCE, force_problem
 from cdpr_drake.errors import (
     CableGeometryError,
     RobotFileError,
@@ -31,8 +30,6 @@ from cdpr_drake.systems.diagrams.mechanism_control import (
     mechanism_refusals,
 )
 from cdpr_drake.systems.diagrams.scenario_checks import SERVO_REFUSALS
-from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
-from cdpr_drake.systems.remote.settings import place_refusals
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import (
     MECHANISM,
@@ -54,6 +51,7 @@ from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.systems.worlds.checks import world_refusals
 from cdpr_drake.systems.worlds.world import make_world
 from cdpr_drake.tensions.methods import distribute
@@ -82,26 +80,19 @@ def read_inputs(scenario: Scenario) -> None:
 
 
 def _control_refusals(scope: Scope) -> Iterator[Refusal]:
-    """What of a scenario of dynamic control does not go together."""
-    scenario, robot = scope.whole, scope.robot
-    yield from place_refusals(scenario.remote, TENSION_PLACES)
+    """Robots that dynamic control is not for."""
+    robot = scope.robot
     if robot.winch_groups().are_shared():
         found = f"{robot.name} with several cables on one winch, which cannot be given tensions"
         yield "robot", f"{found} one by one", "a robot with a winch for each cable"
-    beside = {
-        "perturbations.believed_robot": scenario.perturbations.believed_robot,
-        "force_control": scenario.force_control,
-    }
-    for key, other in product(beside, ("remote", "predictive")):
-        if beside[key] is not None and getattr(scenario, other) is not None:
-            yield key, f"beside {other}", "one of both"
-    for key in ("force_control", "disturbances"):
-        if getattr(scenario, key) is not None and scenario.integration.engine == COMPILED:
+
+
+def _engine_refusals(scope: Scope) -> Iterator[Refusal]:
+    """Sections beside the engine compiled that the plant alone can run."""
+    scenario = scope.whole
+    for key, section in sections_of(scenario):
+        if section.needs_plant(scenario) and scenario.integration.engine == COMPILED:
             yield "integration.engine", f"{COMPILED} beside {key}", "plant"
-    for key in ("predictive", "force_control"):
-        if getattr(scenario, key) is not None and scenario.controller.balance != WRENCH:
-            found = f"{scenario.controller.balance} beside {key}"
-            yield "controller.balance", found, WRENCH
 
 
 def _tension_refusals(scope: Scope) -> Iterator[Refusal]:
@@ -219,8 +210,8 @@ def check_robot_motion(robot: Robot, where: Path | str) -> None:
 
 
 SCENARIO_SCHEMAS: dict[str, tuple[type[Any], tuple[Callable[[Scope], Iterator[Refusal]], ...]]] = {
-    VISUAL_SERVO: (Scenario, (belief_refusals, *SERVO_REFUSALS)),
-    TENSION_CONTROL: (TensionScenario, (belief_refusals, _tension_refusals)),
+    VISUAL_SERVO: (Scenario, (belief_refusals, _engine_refusals, *SERVO_REFUSALS)),
+    TENSION_CONTROL: (TensionScenario, (belief_refusals, _engine_refusals, _tension_refusals)),
     PICK_AND_PLACE: (PickAndPlaceScenario, (pick_and_place_refusals,)),
     MECHANISM: (MechanismScenario, (mechanism_refusals,)),
 }

@@ -24,10 +24,10 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
-from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
-from cdpr_drake.systems.sections import sections_of
+from cdpr_drake.systems.sections import Platform, add_pushes, sections_of
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 
 
@@ -147,8 +147,8 @@ def add_visual_servo(
     for port, source in seen_ports(settings, sight, estimator, target.mark).items():
         builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
-    if isinstance(servo, RemoteServo):
-        for port in ("tensions", "lengths"):
+    for port in ("tensions", "lengths"):
+        if servo.HasInputPort(port):
             builder.Connect(robot.GetOutputPort(port), servo.GetInputPort(port))
     corrector, velocities = add_tension_corrector(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,
@@ -173,8 +173,17 @@ def add_visual_servo(
         torque=torque,
         prefix=prefix,
     )
-    for _, section in sections_of(settings):
+    sections = [section for _, section in sections_of(settings)]
+    for section in sections:
         blocks.logged.update(section.add_to(builder, blocks, settings))
+    platform = Platform(
+        robot=robot.robot, X_WP=robot.GetOutputPort("X_WP"),
+        state=robot.GetOutputPort("platform_state"), seed=settings.seed, prefix=prefix,
+    )  # fmt: skip
+    wrench = add_pushes(builder, sections, platform)
+    if wrench is not None:
+        builder.Connect(wrench, robot.GetInputPort(APPLIED_WRENCH))
+        blocks.logged[APPLIED_WRENCH] = wrench
     return blocks
 
 

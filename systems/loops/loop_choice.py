@@ -54,14 +54,10 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its world has contact"
     if scenario.world is not None:
         return "the clearances of its world are measured by blocks"
-    if scenario.disturbances is not None:
-        return "its disturbances are a block of a diagram"
     if scenario.failures is not None:
         return "its failures are a block of a diagram"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
-    if scenario.remote is not None:
-        return "a process outside closes its loop"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
     if scenario.pose_plan is not None:

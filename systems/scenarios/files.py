@@ -12,10 +12,10 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError, accepted_names
 from cdpr_drake.models.camera_files import resolved_camera
-from cdpr_drake.models.exit_points import MARK as RAILS_MARK
-from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
+from cdpr_drake.models.robot_loader import MARK as RAILS_MARK
 from cdpr_drake.models.robot_loader import load_robot, robot_file, robot_names
 from cdpr_drake.schema.declarations import Refusal, Scope
 from cdpr_drake.schema.input_files import input_text, input_there

@@ -11,6 +11,7 @@ from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, settings
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, PLANT
+from cdpr_drake.systems.sections import sections_of, with_sections
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
 DIAGRAM = "diagram"
@@ -54,6 +55,7 @@ class RunHeader:
 
 
 @settings
+@with_sections("robot_scenario")
 class ScenarioHeader(RunHeader):
     """What a scenario is called, which robot it moves, and how long it runs."""
 
@@ -142,6 +144,11 @@ def engine_of(scenario: Any) -> str:
     return COMPILED if scenario.integration.engine == COMPILED else PLANT
 
 
+def needs_plant(scenario: Any) -> bool:
+    """Whether the engine plant alone can run a scenario of any kind, contact aside."""
+    return any(section.needs_plant(scenario) for _, section in sections_of(scenario))
+
+
 def many_steps_reason(scenario: Any, repeated: bool) -> str:
     """Why a scenario of any kind takes so many steps that its engine matters; empty: it does not.
 
@@ -169,7 +176,7 @@ def set_engine(scenario: AnyScenario, repeated: bool = False) -> tuple[AnyScenar
     if asked.integration.engine == AUTOMATIC and has_contact(scenario):
         why = "its world has contact, which the compiled engine has not"
         return scenario, f"{asked.name}: by the engine plant, as {why}"
-    if getattr(asked, "plant_alone", False):
+    if needs_plant(asked):
         return scenario, ""
     why = many_steps_reason(asked, repeated)
     if asked.integration.engine != AUTOMATIC or not why:

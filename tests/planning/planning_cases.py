@@ -13,8 +13,8 @@ from cdpr_drake.analyses.planning.robot_path_task import (
 )
 from cdpr_drake.control.task_space import TaskGains, computed_torque
 from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.planning.path_timing import plan_along_path
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 

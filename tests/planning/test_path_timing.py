@@ -17,8 +17,8 @@ from cdpr_drake.analyses.planning.plan_tracking import track_plan
 from cdpr_drake.analyses.planning.robot_path_task import make_path, robot_limits
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
+from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.planning.failures import check_held, not_held, stuck
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import ACTIVE, MotionSamples, PathTask, sample_motion, samples_at

@@ -1,7 +1,9 @@
 """Settings: what their fields accept, in words and in files, and what `help` has of them."""
 
+import inspect
 import math
-from dataclasses import fields
+import pickle
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,7 +26,7 @@ from cdpr_drake.schema.declarations import (
     settings_of,
     values,
 )
-from cdpr_drake.schema.typed_yaml import dump_typed, parse_typed
+from cdpr_drake.schema.typed_yaml import dump_typed, parse_typed, refuse
 from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -46,6 +48,27 @@ class Spring:
 class Suspension(Spring):
     kind: Annotated[str, OneOf(("hard",)), "Which it is now."] = "hard"
     inner: Annotated[Spring, "Another one."] = filled(Spring)
+
+
+@settings
+class Rod:
+    length: Annotated[float, In("m"), "Length."] = 1.0
+
+    def refusals(self, scope):
+        if self.length < 0.0:
+            yield "length", self.length, "at least 0"
+        math.log(self.length)
+
+
+@settings
+class Truss:
+    rods: Annotated[list[Rod], "Rods."] = filled(list)
+    height: Annotated[float, In("m"), "Height."] = 1.0
+
+    def refusals(self, scope):
+        if self.height > 5.0:
+            yield "height", self.height, "at most 5"
+        [math.sqrt(rod.length) for rod in self.rods]
 
 
 @settings
@@ -78,7 +101,7 @@ WORDS = {
     "point": "3 numbers [m]",
     "table": "n x 2 numbers [m] or null",
     "name": "text or null",
-    "file": "1 to 64 letters, digits, _ . -, the first one no .",
+    "file": "1 to 64 letters, digits, _ . -, the first one no dot",
     "kinds": "a list of a, b",
     "on_board": "true or false",
     "needed": "a mapping",
@@ -116,6 +139,26 @@ def test_help_has_words_units_and_ranges_of_all_fields():
         "    kind: Which it is now. Accepted: one of hard.\n"
         "    inner: Another one. Accepted: a mapping."
     )
+    ending = settings_of(
+        settings(type("S", (), {"__annotations__": {"x": Annotated[str, OneOf(["e.g."]), "X."]}}))
+    )["x"]
+    assert ending.help() == "X. Accepted: one of e.g."
+
+
+def test_help_begins_with_plain_types_and_defaults():
+    assert str(inspect.signature(Machine)) == (
+        "(*, mass: float, share: float = 0.5, limit: float | None = None, count: int = 3, "
+        "point: numpy.ndarray = array([0., 1., 2.]), table: numpy.ndarray | None = None, "
+        "name: str | None = None, file: str = 'a', kinds: list[str] = [], on_board: bool = True, "
+        f"needed: {__name__}.Spring, absent: {__name__}.Spring | None = None, "
+        f"parts: list[{__name__}.Spring] = [], joints: dict[str, numpy.ndarray] = {{}}, "
+        f"packages: dict[str, str] = {{}}, springs: dict[str, {__name__}.Spring] = {{}})"
+    )
+    assert "inner: tests.schema.test_settings.Spring = Ellipsis" in str(
+        inspect.signature(Suspension.__init__)
+    )
+    again = pickle.loads(pickle.dumps(replace(Suspension(), stiffness=2.0)))
+    assert again == Suspension(stiffness=2.0)
 
 
 @pytest.mark.parametrize("schema", [Robot, Scenario, TensionScenario, SensorSuite, DampingSettings])
@@ -165,6 +208,18 @@ def test_each_kind_is_read_and_written():
     again = parse_typed(Machine, dump_typed(made), Path("again.yaml"))
     assert dump_typed(again) == dump_typed(made)
     assert type(made.name) is type(made.packages["one"]) is str
+
+
+def test_an_exception_of_a_section_is_passed_over_if_it_or_a_section_within_is_refused():
+    with pytest.raises(DataFileError) as caught:  # the truss raises before its rod is asked
+        refuse(Truss(rods=[Rod(), Rod(length=-1.0)]))
+    assert caught.value.problems == ("rods[1].length: found -1.0; accepted: at least 0",)
+
+
+@pytest.mark.parametrize("height", [1.0, 6.0])
+def test_an_exception_of_a_section_is_raised_whatever_another_one_is_refused_for(height):
+    with pytest.raises(ValueError, match="math domain error"):
+        refuse(Truss(rods=[Rod(length=0.0)], height=height))
 
 
 WRONG = {

@@ -71,8 +71,3 @@ def in_parts(rule: Setting) -> bool:
 def axis_names(rule: Setting) -> tuple[str, str, str]:
     """Names of the three numbers of a field: along axes, or of angles."""
     return ("phi", "theta", "psi") if rule.unit in ("deg", "rad") else ("x", "y", "z")
-
-
-def hint(rule: Setting) -> str:
-    """What a field is and what it accepts, for who hesitates."""
-    return f"{rule.doc} Accepted: {rule.accepts()}"

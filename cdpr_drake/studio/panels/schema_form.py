@@ -14,7 +14,6 @@ from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.panels.field_words import (
     axis_names,
     field_words,
-    hint,
     in_parts,
     number_text,
     typed_number,
@@ -83,7 +82,7 @@ class SchemaForm:
         name = str(place[-1])
         axes = f" {', '.join(axis_names(rule))}" if in_parts(rule) else ""
         label = ui.label(f"{name.replace('_', ' ')}{axes}").classes("studio-label")
-        label.props["title"] = hint(rule)
+        label.props["title"] = rule.help()
         with ui.element("div").classes("studio-parts"):
             cells = self.inputs(rule, place, order, problem=None)
         problem = ui.label().classes("studio-field-problem").props('role="alert"')

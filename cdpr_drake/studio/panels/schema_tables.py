@@ -9,7 +9,7 @@ from nicegui import ui
 
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.declarations import Setting, settings_of
-from cdpr_drake.studio.panels.field_words import axis_names, hint, in_parts, typed_value
+from cdpr_drake.studio.panels.field_words import axis_names, in_parts, typed_value
 from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at
 from cdpr_drake.studio.workbench.document import Document
@@ -126,7 +126,7 @@ class SchemaGroups:
                 unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
                 axes = f" {', '.join(axis_names(rule))}" if in_parts(rule) else ""
                 head = ui.label(f"{name.replace('_', ' ')}{axes}{unit}").classes("studio-head")
-                head.props["title"] = hint(rule)
+                head.props["title"] = rule.help()
             ui.label()
             for number in range(len(items)):
                 self._item((*place, number), bare, columns, is_colored)

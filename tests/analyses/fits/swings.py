@@ -21,9 +21,9 @@ from cdpr_drake.analyses.logs.measurements import Measurements
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.identification.swings import SwingSigmas, SwingTask, fit_swings
-from cdpr_drake.models.materials import BehaviourSettings, OwnMaterial
+from cdpr_drake.models.cable_schema import BehaviourSettings, OwnMaterial
+from cdpr_drake.models.platform_schema import HysteresisSettings
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import HysteresisSettings
 from cdpr_drake.schema.typed_yaml import dump_typed
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.settings import CableRobotSettings, CableSettings, DampingSettings

@@ -18,7 +18,7 @@ from cdpr_drake.analyses.runs.checks import (
 from cdpr_drake.analyses.runs.unexpected_end import servo_message, slack_words, unexpected_end
 from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.poses import pose_row
-from cdpr_drake.models.materials import BehaviourSettings
+from cdpr_drake.models.cable_schema import BehaviourSettings
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.diagrams.load import load_scenario

@@ -23,12 +23,13 @@ from cdpr_drake.analyses.runs.seeds import (
     Record,
     Repetition,
     entries,
+    repeat_run,
     run_many,
     statistics,
     with_seeds,
 )
 from cdpr_drake.analyses.runs.servo import ServoRun
-from cdpr_drake.errors import InfeasibleTensionError, OutputFormatError
+from cdpr_drake.errors import InfeasibleTensionError, OutputFormatError, SweepError
 from cdpr_drake.geometry.poses import pose_from_angles, pose_from_row, pose_row
 from cdpr_drake.models.robot_loader import robot_file
 from cdpr_drake.systems.diagrams.load import load_scenario
@@ -129,6 +130,13 @@ def test_a_scenario_that_cannot_be_built_is_an_error():
     high = load_scenario("acrobot_pbvs", [*SHORT, "initial_pose.position=[0, 0, 1.1]"])
     with pytest.raises(InfeasibleTensionError, match="cannot hold the platform"):
         run_many([high], 1)
+
+
+def test_workers_that_do_not_answer_are_refused_without_any_remark_before():
+    lines = []
+    with pytest.raises(SweepError, match="does not answer"):
+        repeat_run("acrobot_pbvs", seeds=[0], workers="/proc/x", follow=Follow(say=lines.append))
+    assert lines == []
 
 
 def test_all_runs_as_a_table(runs, tmp_path):

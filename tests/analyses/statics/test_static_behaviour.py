@@ -16,9 +16,9 @@ from cdpr_drake.dynamics.contact_hysteresis import ContactHysteresis
 from cdpr_drake.errors import CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_angles
-from cdpr_drake.models.materials import BehaviourSettings
+from cdpr_drake.models.cable_schema import BehaviourSettings
+from cdpr_drake.models.platform_schema import HysteresisSettings
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import HysteresisSettings
 from cdpr_drake.systems.robots.settings import CableSettings
 from tests.cli.commands import refuse
 from tests.figure_faults import figure_faults

@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 
-from cdpr_drake.models.materials import BehaviourSettings
+from cdpr_drake.models.cable_schema import BehaviourSettings
 from cdpr_drake.models.robot_draws import ParameterCovariance, drawn_robots
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions

@@ -106,6 +106,8 @@ SCENARIOS = {
         ("controller.balance=force", "balance: found force beside force_control"),
         ("predictive={}", "force_control: found beside predictive"),
         ("disturbances={pushes: []}", "disturbances.pushes: found none"),
+        ("force_control=null; integration.engine=compiled",
+         "integration.engine: found compiled beside disturbances; accepted: plant"),
     ],
     "acrobot_led_by_hand": [
         ("force_control.mass=[0, 1, 1, 1, 1, 1]", "mass: found 0; accepted: above 0"),
@@ -159,7 +161,7 @@ CALLS = {
         ScenarioError, "predictive.points: found null"),
     "mount to see": (
         lambda: planar_run("predictive.mount=nose", "predictive.points=[[0, 0, 0]]"),
-        ScenarioError, "predictive.mount: found 'nose'; accepted for planar: onboard"),
+        ScenarioError, "predictive.mount: found 'nose'; accepted: onboard, on the platform"),
     "method": (lambda: block("foo"), TensionProblemError, "method: found foo"),
     "limits": (lambda: block(limits=(9.0, 1.0)), TensionProblemError, "lower <= upper"),
     "reference": (lambda: block("reference_program"), TensionProblemError, "no reference"),

@@ -26,9 +26,9 @@ from cdpr_drake.geometry.poses import (
     rotation_from_vector,
     rotation_vector,
 )
+from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor

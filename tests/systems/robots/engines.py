@@ -10,8 +10,8 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.primitives import Linearize
 
 from cdpr_drake.geometry.poses import rotation_from_vector
-from cdpr_drake.models.materials import BehaviourSettings
-from cdpr_drake.models.robot_schema import HysteresisSettings
+from cdpr_drake.models.cable_schema import BehaviourSettings
+from cdpr_drake.models.platform_schema import HysteresisSettings
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_motion import HELD

@@ -21,8 +21,8 @@ from pydrake.trajectories import PiecewisePolynomial
 from cdpr_drake.dynamics.robot_arrays import DAMPING
 from cdpr_drake.errors import DivergedError
 from cdpr_drake.geometry.poses import pose_error
+from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.systems.batches.batch_robots import BatchRobots
 from cdpr_drake.systems.loops.robot_motion import RobotMotion
 from cdpr_drake.systems.robots.cable_forces import CREPT

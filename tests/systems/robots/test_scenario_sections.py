@@ -10,8 +10,8 @@ from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.analyses.statics.static import solve_static
 from cdpr_drake.control.task_space import TaskGains
+from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import PlatformDamping
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import (
