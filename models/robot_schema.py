@@ -1,7 +1,7 @@
 """The schema of a robot file: what a cable robot is, with units and accepted ranges."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -70,7 +70,7 @@ class CameraMount:
 
     name: Annotated[Text, "Name of the mounting, once in a robot."]
     model: Annotated[Text, "Camera of the catalogue, or path of a camera file."]
-    parent: Annotated[str, OneOf(("platform", "world")), "What carries it."] = "platform"
+    parent: Annotated[str, OneOf(("platform", "world")), "Body that carries it."] = "platform"
     pose: Annotated[Pose, "Pose of the camera frame C in the parent, z forward, y down."]
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
@@ -91,7 +91,7 @@ class Robot(Summarized):
     """A cable-driven parallel robot."""
 
     name: Annotated[Name, "Name, the same as that of its folder."]
-    title: Annotated[Text, "What it is, in one line."] = ""
+    title: Annotated[Text, "Title in one line."] = ""
     motion: Annotated[
         str,
         OneOf(MOTION_TYPES),
@@ -100,9 +100,9 @@ class Robot(Summarized):
     ] = "3R3T"
     axis: Annotated[
         Direction | None,
-        "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the "
-        "plane in W, of 2R3T that of the beam in P, of any length; null: z. Line and "
-        "plane go through the home position.",
+        "Axis of the motion type, of any length: direction of the line in W (1T), normal of the "
+        "plane in W (2T, 2T1R, 1R2T), axis of the beam in P (2R3T); null: z. Line and plane go "
+        "through the home position.",
     ] = None
     plane_height: Annotated[
         float | None,
@@ -112,17 +112,17 @@ class Robot(Summarized):
     gravity: Annotated[
         float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
     ] = 9.81
-    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+    gravity_direction: Annotated[Direction, "Direction of gravity in W, of any length."] = values(
         0.0, 0.0, -1.0
     )
     platform: Annotated[Platform, "The moving platform."]
     cable: Annotated[
-        CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
+        CableMaterial, "Material of the cables; a cable's own `material` overrides it."
     ]
     cable_model: Annotated[
         str | None,
         OneOf(tuple((name for name, model in CABLE_MODELS.items() if model.extensible))),
-        "How a cable answers to its length, in simulations and at rest; scenarios and "
+        "Law of tension and length of a cable, in simulations and at rest; scenarios and "
         "options override it. Default: straight cables without weight.",
     ] = None
     damping: Annotated[
@@ -138,14 +138,14 @@ class Robot(Summarized):
     tension_bounds: Annotated[TensionBounds, "Accepted tensions."]
     frame: Annotated[Frame, "The frame."]
     home: Annotated[Pose, "A pose well inside the workspace."]
-    cables: Annotated[list[Cable], "The cables, in the order of all vectors of m."]
+    cables: Annotated[list[Cable], "The m cables; all vectors of cables have this order."]
     cameras: Annotated[list[CameraMount], "Camera mountings."] = filled(list)
     slack_readings: Annotated[
         np.ndarray | None,
         In("N", None),
-        "What tension sensors read while the cables are slack; null: zero.",
+        "Readings of the tension sensors while the cables are slack; null: zero.",
     ] = None
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """What no robot is."""
@@ -210,7 +210,7 @@ class Robot(Summarized):
     def cable_behaviour(self) -> CableBehaviour:
         """What the cables do beside the elastic law; nothing where the file does not say."""
         settings = self.cable.behaviour
-        return CableBehaviour() if settings is None else settings.behaviour()
+        return CableBehaviour() if settings is None else CableBehaviour(**vars(settings))
 
     def contact_hysteresis(self) -> "ContactHysteresis | None":
         """Friction against turns of the platform; None where the file gives none."""
@@ -237,15 +237,7 @@ class Robot(Summarized):
             pulleys: True: over the robot's pulleys. False: pulleys are ignored, and cables run
                 from fixed exit points to fixed anchor points.
         """
-        axes = [
-            self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
-            for cable in self.cables
-        ]
         common = self.platform_pulley or PlatformPulley(radius=0.0)
-        anchor_axes = [
-            common.swivel_axis if cable.anchor_swivel_axis is None else cable.anchor_swivel_axis
-            for cable in self.cables
-        ]
         materials = self.materials()
         loads = [material.breaking_load for material in materials]
         cables = CableSet.make(
@@ -253,29 +245,22 @@ class Robot(Summarized):
             self.anchor_points(),
             self.stiffness(),
             retardation=np.array([material.retardation_time for material in materials]),
-            pulley_radius=np.array(
-                [
-                    self.pulley.radius if cable.pulley_radius is None else cable.pulley_radius
-                    for cable in self.cables
-                ]
-            ),
+            pulley_radius=np.array(self._each("pulley_radius", self.pulley.radius)),
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
-            swivel_axis=_unit_columns(axes),
+            swivel_axis=_unit_columns(self._each("swivel_axis", self.pulley.swivel_axis)),
             arm=self.pulley.arm,
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
             down=self.down(),
         ).over_platform_pulleys(
-            np.array(
-                [
-                    common.radius
-                    if cable.anchor_pulley_radius is None
-                    else cable.anchor_pulley_radius
-                    for cable in self.cables
-                ]
-            ),
-            _unit_columns(anchor_axes),
+            np.array(self._each("anchor_pulley_radius", common.radius)),
+            _unit_columns(self._each("anchor_swivel_axis", common.swivel_axis)),
         )
         return cables if pulleys else cables.without_pulleys()
+
+    def _each(self, name: str, common: Any) -> list[Any]:
+        """A value of each cable: its own, or the common one where it has none."""
+        own = [getattr(cable, name) for cable in self.cables]
+        return [common if value is None else value for value in own]
 
     def geometry_words(self, pulleys: bool = True) -> str:
         """Geometry of a result in words: "with pulleys of 20 mm", "pulleys ignored", ...
@@ -339,12 +324,10 @@ class Robot(Summarized):
     def _own_drums(self) -> tuple[Array | None, Array | None]:
         """Radii of the drums [m] and mechanical advantages, shape (m,); None where all are the
         winch's, and 1."""
-        radii = [cable.drum_radius for cable in self.cables]
+        own = any(cable.drum_radius is not None for cable in self.cables)
         advantages = np.array([cable.mechanical_advantage for cable in self.cables])
-        common = self.winch.drum_radius
-        own = np.array([common if radius is None else radius for radius in radii])
         return (
-            None if all(radius is None for radius in radii) else own,
+            np.array(self._each("drum_radius", self.winch.drum_radius)) if own else None,
             None if np.all(advantages == 1.0) else advantages,
         )
 
@@ -430,8 +413,8 @@ class Robot(Summarized):
 
         Source: servoing thesis (1.15) to (1.20).
         """
-        X_WP, cables = pose_of(self.home, pose), self.cable_set()
-        J = cable_jacobian(X_WP, cables if pulleys else cables.without_pulleys())
+        X_WP = pose_of(self.home, pose)
+        J = cable_jacobian(X_WP, self.cable_set(pulleys))
         W: Array = self.motion_type().components(-J.T, X_WP.rotation().matrix())
         return W
 
