@@ -24,7 +24,7 @@ from cdpr_drake.schema.declarations import (
 
 @settings
 class BehaviourSettings:
-    """What cables and their sheaves do beside the elastic law; see `cables.cable_behaviour`."""
+    """Effects of cables and sheaves beyond the elastic law; see `cables.cable_behaviour`."""
 
     stiffening: Annotated[
         float,

@@ -62,7 +62,7 @@ def parse_mechanism(content: str, path: Path) -> Mechanism:
 
     Args:
         content: YAML.
-        path: The file that messages name, and beside which others are looked for.
+        path: The file that messages name; further files are searched in its folder.
 
     Raises:
         RobotFileError: As `load_mechanism`.

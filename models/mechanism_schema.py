@@ -129,8 +129,8 @@ class Mechanism(Summarized):
     ]
     packages: Annotated[
         dict[str, Text],
-        "Folders of packages by name, relative to this file, for package:// beside those "
-        "with a package.xml beside or above this file.",
+        "Folders of packages by name, relative to this file, in addition to "
+        "those with a package.xml in its folder or above.",
     ] = filled(dict)
     gravity: Annotated[
         float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
@@ -155,7 +155,7 @@ class Mechanism(Summarized):
     assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """What no mechanism is; what Drake refuses of its bodies is told when they are read."""
+        """Cables, names and files that no mechanism has; Drake refuses bodies as it reads them."""
         if not self.cables:
             yield "cables", "none", "at least one cable"
         yield from repeated((cable.name for cable in self.cables), "cables[{}].name")
@@ -170,7 +170,7 @@ class Mechanism(Summarized):
             yield "mechanism", self.mechanism, "a file that is there"
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         low, high = self.tension_limits()
         eyelets = sum(len(cable.via) for cable in self.cables)
         frames = sorted({where for cable in self.cables for _, where, _ in cable.route()})
@@ -182,7 +182,7 @@ class Mechanism(Summarized):
         ]
 
     def materials(self) -> list[CableMaterial]:
-        """What each cable is made of, m of them."""
+        """Materials of the m cables."""
         return [own_material(self.cable, cable.material) for cable in self.cables]
 
     def stiffness(self) -> Array:

@@ -75,7 +75,7 @@ class ImportedRobot(Summarized):
         }
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         robot, made = self.robot, self.completed
         return f"Robot {robot.name} from {self.tool}", [
             ("source", str(self.source)),

@@ -92,7 +92,7 @@ _WORDS = {
     "cables[].rail.": "exit points were written where they stand",
     "cables[].winch": "each cable has a winch of its own there",
 }
-"""What stands in the place of fields that are left out, by the beginnings of their keys."""
+"""What replaces fields that are left out, by the beginnings of their keys."""
 
 _IN_THE_PLACE = {
     "platform.shape.": ("platform.size", "the platform was written as its box"),

@@ -148,11 +148,11 @@ class Robot(Summarized):
     assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """What no robot is."""
+        """Combinations of sections that no robot has."""
         yield from robot_refusals(self)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         low, high = self.tension_limits()
         radii = sorted({float(radius) for radius in self.cable_set().pulley_radius})
         size, m = numbers(self.platform.size), len(self.cables)
@@ -204,11 +204,11 @@ class Robot(Summarized):
         return np.array([cable.anchor_point for cable in self.cables], float).T
 
     def materials(self) -> list[CableMaterial]:
-        """What each cable is made of, m of them."""
+        """Materials of the m cables."""
         return [own_material(self.cable, cable.material) for cable in self.cables]
 
     def cable_behaviour(self) -> CableBehaviour:
-        """What the cables do beside the elastic law; nothing where the file does not say."""
+        """Effects in addition to the elastic law; none where the file gives no section."""
         settings = self.cable.behaviour
         return CableBehaviour() if settings is None else CableBehaviour(**vars(settings))
 
@@ -219,7 +219,7 @@ class Robot(Summarized):
         return contacts if contacts is not None and contacts.is_there() else None
 
     def diameters(self) -> Array:
-        """Of the cables, shape (m,) [m]."""
+        """Diameters of the cables, shape (m,) [m]."""
         return np.array([material.diameter for material in self.materials()])
 
     def stiffness(self) -> Array:
@@ -227,7 +227,7 @@ class Robot(Summarized):
         return np.array([material.axial_stiffness() for material in self.materials()])
 
     def knows_breaking_loads(self) -> bool:
-        """Whether the file says of any cable when it breaks."""
+        """True if the file gives the breaking load of any cable."""
         return any(material.breaking_load is not None for material in self.materials())
 
     def cable_set(self, pulleys: bool = True) -> CableSet:
@@ -310,7 +310,7 @@ class Robot(Summarized):
         return law
 
     def winch_groups(self) -> "WinchGroups":
-        """Which cables are on which winch."""
+        """The winch of each cable."""
         from cdpr_drake.winches.groups import WinchGroups
 
         return WinchGroups.of_names([cable.winch for cable in self.cables])
@@ -332,16 +332,16 @@ class Robot(Summarized):
         )
 
     def motion_type(self) -> MotionType:
-        """Which motions the platform has."""
+        """The motion type with its axis."""
         x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
         return MotionType(self.motion, (float(x), float(y), float(z)))
 
     def is_underactuated(self) -> bool:
-        """Whether there are fewer cables than degrees of freedom: the weight does the rest."""
+        """True if there are fewer cables than degrees of freedom, so that the weight poses it."""
         return len(self.cables) < self.motion_type().freedom
 
     def is_planar(self) -> bool:
-        """Whether the platform is a body in a horizontal plane, as servos know it beside 3R3T."""
+        """True if the platform is a body in a horizontal plane, which servos accept like 3R3T."""
         return self.motion_type().is_horizontal_body
 
     def servo_rows(self, asks: str) -> tuple[int, ...]:
@@ -363,7 +363,7 @@ class Robot(Summarized):
         return rows
 
     def joint(self) -> "PlatformJoint":
-        """What the platform moves by in a simulation."""
+        """The joint of the platform in a simulation."""
         from cdpr_drake.geometry.platform_joint import PlatformJoint
 
         return PlatformJoint.of(self.motion_type(), self.home.transform(), self.plane_height)
@@ -419,7 +419,7 @@ class Robot(Summarized):
         return W
 
     def camera_mount(self, name: str) -> CameraMount:
-        """The mounting of that name; the names are checked when a scenario is read."""
+        """The mounting of a name, which scenarios check when they are read."""
         return next(mount for mount in self.cameras if mount.name == name)
 
 

@@ -100,7 +100,7 @@ class PlatformShape:
         return Cylinder(self.radius, self.height)
 
     def extent(self, middle: Array) -> tuple[Array, Array]:
-        """Lower and upper corner in P of the box round it, axes along those of P, (3,) [m].
+        """Lower and upper corner in P of its bounding box along the axes of P, (3,) [m].
 
         Raises:
             RobotFileError: The mesh cannot be read.
@@ -208,7 +208,7 @@ def _mesh_inertia(file: str, scale: float, changed: int) -> "SpatialInertia":
 
 
 def mesh_files(file: Path) -> list[Path]:
-    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF.
+    """A mesh and the files that it names: materials of an OBJ, parts of a glTF.
 
     Raises:
         RobotFileError: A glTF is no JSON, or its buffers and images are no lists of objects.
