@@ -107,13 +107,16 @@ class Platform:
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
+    def has_possible_inertia(self) -> bool:
+        """True if a body of positive mass can have these moments of inertia."""
+        least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
+        return bool(least > 0.0 and least + middle >= most * (1.0 - TRIANGLE_ROUNDING))
+
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """Moments of inertia that no body has, and a shape that reaches out of the box."""
-        if self.inertia is not None:
-            least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
-            if least <= 0.0 or least + middle < most * (1.0 - TRIANGLE_ROUNDING):
-                accepted = "positive principal moments, none larger than the sum of the other two"
-                yield "inertia", number_words(self.inertia), accepted
+        if self.inertia is not None and not self.has_possible_inertia():
+            accepted = "positive principal moments, none larger than the sum of the other two"
+            yield "inertia", number_words(self.inertia), accepted
         is_of_shape = self.inertia_of == SHAPE_INERTIA
         if self.shape is None and is_of_shape:
             yield "inertia_of", "shape", "box, or a section platform.shape"
