@@ -108,8 +108,10 @@ class Rod:
     length: Annotated[float, In("m"), "Length."] = 1.0
 
     def refusals(self, scope):
-        if self.length < 0.0:
+        if -5.0 < self.length < 0.0:
             yield "length", self.length, "at least 0"
+        if self.length < -5.0:
+            raise DataFileError("rod.yaml: names no rod")
         math.log(self.length)
 
 
@@ -125,9 +127,11 @@ class Truss:
 
 
 def test_an_exception_of_a_section_is_passed_over_if_it_or_a_section_within_is_refused():
-    with pytest.raises(DataFileError) as caught:  # the truss raises before its rod is asked
-        refuse(Truss(rods=[Rod(), Rod(length=-1.0)]))
-    assert caught.value.problems == ("rods[1].length: found -1.0; accepted: at least 0",)
+    for length, words in ((-1.0, "rods[1].length: found -1.0; accepted: at least 0"),
+                          (-9.0, "rod.yaml: names no rod")):  # fmt: skip
+        with pytest.raises(DataFileError) as caught:  # the truss raises before its rod is asked
+            refuse(Truss(rods=[Rod(), Rod(length=length)]))
+        assert caught.value.problems == (words,)
 
 
 @pytest.mark.parametrize("height", [1.0, 6.0])

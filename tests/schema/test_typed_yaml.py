@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cdpr_drake.errors import DataFileError
@@ -196,6 +196,7 @@ scraps = st.lists(st.sampled_from([*PUNCTUATION, *WORDS, *LISTS, *TAGS]), max_si
 keys = st.sampled_from([*vars(Machine)["__dataclass_fields__"], "x"])
 
 
+@settings(max_examples=300)
 @given(st.text() | scraps | st.tuples(keys, st.text()).map(lambda two: SMALL + ": ".join(two)))
 @example("\ufeffname: first")
 @example("? [1, 2]\n: 3")

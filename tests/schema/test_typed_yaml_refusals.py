@@ -52,6 +52,8 @@ def load(tmp_path):
         ("kind: smell", "kind: found smell; did you mean small? accepted: one of small, large"),
         ("enabled: maybe", "enabled: found maybe; accepted: true or false"),
         ("enabled: 1", "enabled: found 1; accepted: true or false"),
+        ("enabled: 'true'", "enabled: found true; accepted: true or false"),
+        ("enabled: [true]", "enabled: found [true]; accepted: true or false"),
         ("enabled: !!bool maybe", "enabled: found maybe; accepted: true or false"),
         # Lists of sections.
         ("parts: {label: a}", "parts: found {label: a}; accepted: a list of mappings"),
@@ -100,7 +102,7 @@ def test_a_value_that_is_not_accepted_is_named_with_file_line_field_and_range(
         ("name: first\n", ":1: mass: missing; accepted: a number > 0 [kg]"),
         ("{mass: 2.5}", ":1: name: missing; accepted: text"),
         ("name: first\nmas: 3\n", ":2: mas: unknown key; did you mean mass? known: name, mass, sh"),
-        (SMALL + "maas: 3\n", ":3: maas: unknown key; did you mean mass? known: name, mass, sh"),
+        (SMALL + "maas:\n- 3\n", ":3: maas: unknown key; did you mean mass? known: name, mass, sh"),
         *((text, ": found no mapping at the top; accepted: the keys name, mass, sh")
           for text in ("", "# nothing\n", "5\n", "[1, 2]\n", "text", "---\n...\n")),
         ("name: [first\nmass: 2\n", ":2: does not parse as YAML: "),
