@@ -36,13 +36,7 @@ from pydrake.systems.framework import Context
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.geometry.cable_routes import WORLD_BODY
-from cdpr_drake.models.formats.caspr_trees import (
-    KINDS,
-    CasprJoint,
-    CasprLink,
-    Step,
-    euler_xyz,
-)
+from cdpr_drake.models.formats.caspr_trees import KINDS, CasprJoint, CasprLink, Step, euler_xyz
 
 ROUNDING = 1e-14
 """Components of directions that differ by less from -1, 0 or 1 are those, and lengths by less from

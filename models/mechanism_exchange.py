@@ -19,13 +19,7 @@ from cdpr_drake.models.formats.caspr import TOOL, is_caspr_tree, model_files
 from cdpr_drake.models.formats.caspr_mechanism import write_mechanism
 from cdpr_drake.models.formats.caspr_pulleys import short_name
 from cdpr_drake.models.formats.caspr_tree_writer import CABLE_SET, write_tree
-from cdpr_drake.models.formats.caspr_trees import (
-    GRAVITY,
-    CasprCable,
-    CasprTree,
-    excess,
-    read_tree,
-)
+from cdpr_drake.models.formats.caspr_trees import GRAVITY, CasprCable, CasprTree, excess, read_tree
 from cdpr_drake.models.formats.import_words import import_readme
 from cdpr_drake.models.formats.reading import robot_name
 from cdpr_drake.models.formats.tree_assumptions import complete_tree

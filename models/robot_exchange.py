@@ -29,10 +29,7 @@ from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_tur
 from cdpr_drake.models.robot_exports import check_format, names_in_file, xml_words
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import (
-    as_robot,
-    parse_robot,
-)
+from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
 

@@ -25,9 +25,10 @@ class SensorModel:
     source: Annotated[Text, "Where the values stand."]
     assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
-    def refused_limits(self, limits: np.ndarray) -> Iterator[Refusal]:
-        """Limits that nothing lies between."""
-        if limits[0] >= limits[1]:
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits, of sensors that have some, that nothing lies between."""
+        limits = getattr(self, "limits", None)
+        if limits is not None and limits[0] >= limits[1]:
             yield "limits", number_words(limits), "smallest < largest"
 
 
@@ -40,10 +41,6 @@ class TensionSensorModel(SensorModel):
     repeatability: Annotated[float, In("N", ge=0.0), "Standard deviation of repeated readings."]
     resolution: Annotated[float, In("N", ge=0.0), "Step between readings; 0: none."] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of readings per second."]
-
-    def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """Limits that nothing lies between."""
-        yield from self.refused_limits(self.limits)
 
 
 @settings
@@ -97,7 +94,7 @@ class RangeSensorModel(SensorModel):
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """Limits that nothing lies between, and angles that go backwards."""
-        yield from self.refused_limits(self.limits)
+        yield from super().refusals(scope)
         if self.first_angle_deg > self.last_angle_deg:
             yield "first_angle_deg", f"{self.first_angle_deg:g}", "<= last_angle_deg"
 
@@ -142,10 +139,6 @@ class DepthSensorModel(SensorModel):
         float, In("1/m", ge=0.0), "What is added to that for each square metre of depth squared."
     ] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Largest number of images per second."]
-
-    def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """Limits that nothing lies between."""
-        yield from self.refused_limits(self.limits)
 
 
 def tension_sensor_names() -> tuple[str, ...]:

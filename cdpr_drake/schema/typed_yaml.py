@@ -17,13 +17,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import yaml
 
-from cdpr_drake.errors import (
-    MOST_PROBLEMS,
-    DataFileError,
-    Problems,
-    meant_names,
-    why_not_read,
-)
+from cdpr_drake.errors import MOST_PROBLEMS, DataFileError, Problems, meant_names, why_not_read
 from cdpr_drake.schema.declarations import Scope, Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (

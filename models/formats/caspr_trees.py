@@ -32,12 +32,7 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RollPitchYaw, RotationMatrix
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.formats.caspr_pulleys import (
-    PULLEYS,
-    read_pulley,
-    short_name,
-    triple,
-)
+from cdpr_drake.models.formats.caspr_pulleys import PULLEYS, read_pulley, short_name, triple
 from cdpr_drake.models.formats.reading import (
     cable_name,
     child_text,

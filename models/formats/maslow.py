@@ -25,11 +25,7 @@ import yaml
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.formats.draft import DraftCable, RobotDraft, deviation_lines
-from cdpr_drake.models.formats.file_kinds import (
-    MASLOW_CORNERS,
-    MASLOW_SECTION,
-    maslow_settings,
-)
+from cdpr_drake.models.formats.file_kinds import MASLOW_CORNERS, MASLOW_SECTION, maslow_settings
 from cdpr_drake.models.formats.reading import (
     YAML_WORDS,
     fail,

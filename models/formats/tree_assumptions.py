@@ -16,11 +16,7 @@ from cdpr_drake.models.formats.assumptions import (
     CompletedDraft,
 )
 from cdpr_drake.models.formats.caspr import TOOL
-from cdpr_drake.models.formats.caspr_mechanism import (
-    initial_joints,
-    limit_remarks,
-    link_names,
-)
+from cdpr_drake.models.formats.caspr_mechanism import initial_joints, limit_remarks, link_names
 from cdpr_drake.models.formats.caspr_trees import GRAVITY, CasprCable, CasprTree
 
 WORLD = "world"

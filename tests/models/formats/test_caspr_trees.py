@@ -9,10 +9,7 @@ from pydrake.multibody.tree import JointIndex
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats.caspr_mechanism import (
-    joint_names,
-    link_names,
-)
+from cdpr_drake.models.formats.caspr_mechanism import joint_names, link_names
 from cdpr_drake.models.formats.caspr_trees import (
     AXIS_KINDS,
     KINDS,
