@@ -81,7 +81,7 @@ class ImportedMechanism(Summarized):
         }
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         tree, made = self.tree, self.completed
         return f"Mechanism {self.name} from {TOOL}", [
             ("source", str(self.source)),

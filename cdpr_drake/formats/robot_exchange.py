@@ -30,11 +30,7 @@ from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import (
-    as_robot,
-    parse_robot,
-    point_notes,
-)
+from cdpr_drake.models.robot_loader import as_robot, parse_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
 
@@ -77,7 +73,7 @@ class ImportedRobot(Summarized):
         }
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         robot, made = self.robot, self.completed
         return f"Robot {robot.name} from {self.tool}", [
             ("source", str(self.source)),
