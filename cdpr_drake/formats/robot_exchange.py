@@ -11,13 +11,12 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.formats.assumptions import CompletedDraft, complete_draft
+from cdpr_drake.formats.assumptions import CompletedDraft, complete_draft, import_readme
 from cdpr_drake.formats.caspr_writer import write_caspr
 from cdpr_drake.formats.detection import read_foreign
 from cdpr_drake.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.formats.drake_package import write_drake_package
 from cdpr_drake.formats.gazebo_yaml import write_gazebo_yaml
-from cdpr_drake.formats.import_words import import_readme
 from cdpr_drake.formats.joint_chains import write_sdformat, write_urdf
 from cdpr_drake.formats.klipper import write_klipper
 from cdpr_drake.formats.maslow import write_maslow
