@@ -24,6 +24,7 @@ SECTIONS = {
     "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
     "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
+    "visual_servo.pose_plan": "cdpr_drake.sections.pose_plan.section:PosePlanSettings",
     "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.force_control": "cdpr_drake.sections.force_control.section:ForceControl",

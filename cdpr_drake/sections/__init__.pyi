@@ -8,6 +8,8 @@ from .emergency.reaction import EmergencyReaction as EmergencyReaction
 from .emergency.section import EmergencySettings as EmergencySettings
 from .force_control.section import ForceControl as ForceControl
 from .force_control.section import ForceTracking as ForceTracking
+from .pose_plan.section import PlannedPoseServo as PlannedPoseServo
+from .pose_plan.section import PosePlanSettings as PosePlanSettings
 from .predictive.section import PredictiveDistributor as PredictiveDistributor
 from .predictive.section import PredictiveSettings as PredictiveSettings
 from .stability.section import StabilitySettings as StabilitySettings

@@ -25,7 +25,6 @@ from cdpr_drake.systems.diagrams.fusion_checks import fusion_refusals
 from cdpr_drake.systems.diagrams.pan_tilt import pan_tilt_refusals
 from cdpr_drake.systems.diagrams.tension_management import management_refusals
 from cdpr_drake.systems.diagrams.torque_control import (
-    plan_refusals,
     torque_refusals,
     winch_group_refusals,
 )
@@ -262,7 +261,6 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     _winches,
     winch_group_refusals,
     torque_refusals,
-    plan_refusals,
     _integration,
     _world,
 )

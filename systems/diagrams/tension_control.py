@@ -380,16 +380,13 @@ def build_tension_control(
     log = None
     if log_rate is not None:
         # `read_log` makes the rest from these; what is logged costs in the loop.
-        logged = {
-            "platform_state": blocks.state,
-            "desired_wrench": blocks.controller.GetOutputPort("desired_wrench"),
-        }
+        logged = {"platform_state": blocks.state}
+        for name in blocks.controller.logged():
+            logged[name] = blocks.controller.GetOutputPort(name)
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
         if blocks.pushes is not None:
             logged[APPLIED_WRENCH] = blocks.pushes.GetOutputPort("wrench")
-        for name in blocks.controller.logged:
-            logged[name] = blocks.controller.GetOutputPort(name)
         if meters is not None and meters.contact is not None:
             logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)

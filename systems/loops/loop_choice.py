@@ -64,8 +64,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return f"its camera is {scenario.camera.kind}"
     if scenario.camera.pan_tilt is not None:
         return "its camera turns on two joints, which are blocks of a diagram"
-    if scenario.pose_plan is not None:
-        return "its plan of poses is a block of a diagram"
     if scenario.sensors.looks_round():
         return "its sensors look at a scene"
     if scenario.estimator.platform_tag is not None:
