@@ -10,11 +10,15 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Annotated, Any, ClassVar
 
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder
+
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import Refusal, Scope
 
 SECTIONS = {
@@ -25,17 +29,40 @@ SECTIONS = {
     "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
     "visual_servo.pose_plan": "cdpr_drake.sections.pose_plan.section:PosePlanSettings",
+    "robot_scenario.disturbances": "cdpr_drake.sections.disturbances.section:DisturbanceSettings",
     "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.force_control": "cdpr_drake.sections.force_control.section:ForceControl",
     "tension_control.predictive": "cdpr_drake.sections.predictive.section:PredictiveSettings",
 }
-"""Module and class of each section, by the place of its key in scenarios."""
+"""Module and class of each section, by the place of its key in scenarios: `robot_scenario` is every
+kind but that of mechanisms."""
 
 GROUP = "cdpr_drake.sections"
 """Entry points of other packages' sections."""
 
 _LOG = logging.getLogger(__name__)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Platform:
+    """A platform in a builder, which sections may push.
+
+    Attributes:
+        robot: The robot.
+        X_WP: Pose of the platform, abstract RigidTransform [m].
+        state: Positions and velocities of its joint, as `CableForces` takes them: for one that
+            moves freely quaternion and place of Po, then angular velocity and velocity of Po in W,
+            shape (13,) [m, rad/s, m/s].
+        seed: Of the scenario.
+        prefix: What the names of blocks begin with.
+    """
+
+    robot: Robot
+    X_WP: OutputPort
+    state: OutputPort
+    seed: int
+    prefix: str = ""
 
 
 class Section:
@@ -49,6 +76,8 @@ class Section:
         columns: By the names of the quantities that it logs: what their numbers are called in
             `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
+        by_hand: By what can be done by hand to a run that goes on, see `do`: the section's least
+            content, as YAML, which lets it be done and changes nothing. Of `robot_scenario` only.
         outside: True if a process outside closes the loop. The block in whose place it stands
             has an attribute `outside`, its place, which a run hands to `Follow.connect`.
     """
@@ -56,6 +85,7 @@ class Section:
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
     report: ClassVar[str] = ""
+    by_hand: ClassVar[Mapping[str, str]] = {}
     outside: ClassVar[bool] = False
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
@@ -82,7 +112,7 @@ class Section:
         """Makers of blocks of dynamic control in the place of the usual ones.
 
         Args:
-            settings: The `TensionControlSettings` of a run, with the usual makers.
+            settings: The `TensionControlSettings` with the makers so far, and what is believed.
             robot: The robot.
 
         Returns:
@@ -116,6 +146,38 @@ class Section:
         """
         return {}
 
+    def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort | None:
+        """Adds what pushes the platform, in a scenario of any kind but a mechanism's.
+
+        The engine compiled takes a wrench that follows the platform only from a state that its
+        block samples; by the plant it may follow pose and state at once.
+
+        Args:
+            builder: The DiagramBuilder that has the robot.
+            platform: The platform.
+
+        Returns:
+            Moment about Po and force on the platform in W, shape (6,) [N m, N], which is added to
+            those of other sections and logged as `applied_wrench`; None: nothing pushes.
+        """
+        return None
+
+    def do(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
+        """Does by hand what a request asks for: enters it into these settings, which the blocks of
+        the running diagram read, so that the scenario in the results gives the same run again.
+
+        Args:
+            request: `what`, a key of `by_hand`, and what belongs to it.
+            now: The simulated time [s].
+
+        Returns:
+            Time `t` [s] at which it was asked for, and `words`.
+
+        Raises:
+            ScenarioError: It cannot be done; one line.
+        """
+        raise NotImplementedError
+
 
 def sections_of(settings: Any) -> Iterator[tuple[str, Section]]:
     """The sections that settings have, in the order of their fields, each with its key."""
@@ -126,6 +188,24 @@ def sections_of(settings: Any) -> Iterator[tuple[str, Section]]:
         elif dataclasses.is_dataclass(value):
             for key, section in sections_of(value):
                 yield f"{field.name}.{key}", section
+
+
+def add_pushes(
+    builder: DiagramBuilder, sections: Iterable[Section], platform: Platform
+) -> OutputPort | None:
+    """Adds what sections push a platform with.
+
+    Returns:
+        The sum of their wrenches, shape (6,) [N m, N]; None: nothing pushes.
+    """
+    pushed = (section.push(builder, platform) for section in sections)
+    wrenches = [wrench for wrench in pushed if wrench is not None]
+    if len(wrenches) < 2:
+        return wrenches[0] if wrenches else None
+    total = builder.AddNamedSystem(platform.prefix + "pushes", Adder(len(wrenches), 6))
+    for index, wrench in enumerate(wrenches):
+        builder.Connect(wrench, total.get_input_port(index))
+    return total.get_output_port()
 
 
 def with_sections(place: str) -> Callable[[type], type]:

@@ -69,7 +69,7 @@ PIECE = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """A subject of a run: its numbers in the summary, its figures, or both.
 
@@ -377,7 +377,7 @@ class Run(Result):
             load_object(section.report)
             for _, section in sections_of(self.scenario) if section.report
         )  # fmt: skip
-        subjects = [*self.subjects, *chain.from_iterable(of_sections)]
+        subjects = dict.fromkeys([*self.subjects, *chain.from_iterable(of_sections)])
         return [subject for subject in subjects if subject.applies(self)]
 
     def ending(self) -> dict[str, Any]:

@@ -32,7 +32,6 @@ from cdpr_drake.analyses.runs.sensing import PAN_TILT, SENSING
 from cdpr_drake.analyses.runs.stability import STABILITY, Stability, stability_of_run
 from cdpr_drake.analyses.runs.subjects import (
     BEHAVIOUR,
-    DISTURBANCES,
     FAILURES,
     MOTORS,
     TENSION_GAIN,
@@ -114,8 +113,8 @@ class TorqueSteps:
 
 
 SUBJECTS = (
-    MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, DISTURBANCES, FAILURES,
-    PAN_TILT, WORLD, STABILITY,
+    MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, FAILURES, PAN_TILT, WORLD,
+    STABILITY,
 )  # fmt: skip
 """Subjects of runs of visual servos, in the order of their numbers in a summary."""
 

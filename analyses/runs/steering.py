@@ -36,7 +36,6 @@ from multiprocessing.connection import Connection
 from time import monotonic
 from typing import Any
 
-import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, EventStatus
 
@@ -47,9 +46,8 @@ from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.systems.loops.loop_choice import uses_compiled_loop
-from cdpr_drake.systems.robots.disturbances import PUSH as PUSHES
-from cdpr_drake.systems.robots.disturbances import Disturbances, Push
 from cdpr_drake.systems.robots.failures import BREAKS, Failure, Failures
+from cdpr_drake.systems.sections import sections_at
 
 SAMPLE_RATE, IMAGE_RATE = 30.0, 15.0
 """Samples and images per second at most [Hz]."""
@@ -67,15 +65,14 @@ LARGEST_MESSAGE = 16 * 2**20
 """Size of a message or image; larger ones are no messages of a run [byte]."""
 
 BREAK, PUSH = "break", "push"
+"""What the studio lets be done by hand; `UNTOUCHED` has all there is."""
 
-UNTOUCHED = {
-    BREAK: ("failures", "{events: []}"),
-    PUSH: ("disturbances", "{pushes: [{kind: step, force: [0.0, 0.0, 0.0]}]}"),
+UNTOUCHED = {BREAK: ("failures", "{events: []}")} | {
+    act: (key, least)
+    for key, section in sections_at("robot_scenario").items()
+    for act, least in section.by_hand.items()
 }
 """By what can be done by hand, the section of a scenario that it needs, and its least content."""
-
-LARGEST_FORCE, LONGEST_PUSH = 1e6, 60.0
-"""Limits of a push [N, s]."""
 
 
 def steered(follow: Follow, scenario: Any, descriptor: int) -> Follow:
@@ -280,7 +277,7 @@ class Steering:
             pace.go_at(factor)
         elif what == "stop":
             self._end()
-        elif what in (BREAK, PUSH):
+        elif what in UNTOUCHED:
             try:
                 event = self._hands.do(data, now)
             except ScenarioError as problem:
@@ -339,37 +336,32 @@ class Pace:
 
 
 class ByHand:
-    """Breaks cables and pushes the platform of a running diagram.
+    """Breaks cables of a running diagram, and does what sections of its scenario let be done.
 
-    What is done is entered into the sections `failures` and `disturbances` of the scenario, with
-    its time, so that the scenario in the results gives the same run again.
+    What is done is entered into the sections, with its time, so that the scenario in the results
+    gives the same run again.
 
     Attributes:
-        takes: What can be done: `BREAK`, `PUSH`, both or none.
+        takes: What can be done, of `UNTOUCHED`.
     """
 
     def __init__(self, scenario: Any) -> None:
         """For the scenario of which the diagram is built."""
-        failures, disturbances = (
-            getattr(scenario, section, None) for section, _ in UNTOUCHED.values()
-        )
-        # Events at the start fix the times of events in the diagram.
-        accepted = {
-            BREAK: failures is not None and not failures.events, PUSH: disturbances is not None,
-        }  # fmt: skip
-        self.takes = tuple(name for name in accepted if accepted[name])
+        sections = {act: getattr(scenario, key, None) for act, (key, _) in UNTOUCHED.items()}
+        failures: Any = sections[BREAK]
+        if failures is not None and failures.events:
+            del sections[BREAK]  # events at the start fix the times of events in the diagram
+        self._sections = {act: section for act, section in sections.items() if section is not None}
+        self.takes = tuple(self._sections)
         self._cables = [cable.name for cable in load_robot(scenario.robot).cables]
         self._broken: set[int] = set()
         self._failures: Failures | None = None
-        self._disturbances: Disturbances | None = None
 
     def prepare(self, diagram: Diagram) -> None:
-        """Takes the blocks of a diagram that do it."""
+        """Takes the block of a diagram that breaks cables."""
         for system in diagram.GetSystems():
             if isinstance(system, Failures):
                 self._failures = system
-            elif isinstance(system, Disturbances):
-                self._disturbances = system
             elif isinstance(system, Diagram):
                 self.prepare(system)
 
@@ -389,7 +381,10 @@ class ByHand:
                 f"{what}: found it with a scenario without {UNTOUCHED[what][0]}; accepted: "
                 f"{', '.join(self.takes) or 'nothing by hand'}"
             )
-        return self._break(request, now) if what == BREAK else self._push(request, now)
+        if what == BREAK:
+            return self._break(request, now)
+        done: dict[str, Any] = self._sections[what].do(request, now)
+        return done
 
     def _break(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
         assert self._failures is not None
@@ -400,26 +395,3 @@ class ByHand:
         self._broken.add(number)
         self._failures.add(Failure(kind=BREAKS, time=now, cable=number))
         return {"t": now, "words": f"{self._cables[number]} breaks", "cable": number}
-
-    def _push(self, request: Mapping[str, Any], now: float) -> dict[str, Any]:
-        assert self._disturbances is not None
-        try:
-            force = np.array(request.get("force"), float)
-            seconds = float(request.get("seconds", np.nan))
-        except (TypeError, ValueError):
-            force, seconds = np.full(3, np.nan), np.nan
-        size = float(np.linalg.norm(force)) if force.shape == (3,) else np.nan
-        if not 0.0 < size <= LARGEST_FORCE:
-            raise ScenarioError(
-                f"force: found {str(request.get('force'))[:60]}; accepted: three numbers, together "
-                f"above 0 to {LARGEST_FORCE:g} N"
-            )
-        if not 0.0 < seconds <= LONGEST_PUSH:
-            raise ScenarioError(
-                f"seconds: found {str(request.get('seconds'))[:60]}; accepted: above 0 to "
-                f"{LONGEST_PUSH:g} s"
-            )
-        period = self._disturbances.period
-        start = (math.floor(now / period) + 1) * period  # a period under way is not changed
-        self._disturbances.add(Push(kind=PUSHES, start=start, end=start + seconds, force=force))
-        return {"t": now, "words": f"push of {size:g} N for {seconds:g} s"}

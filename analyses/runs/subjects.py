@@ -30,7 +30,6 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import BOUND, DISTANCE, nth_look
 from cdpr_drake.systems.diagrams.tension_management import used_gain
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
-from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.run_settings import has_contact
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
@@ -147,18 +146,7 @@ PROGRAM_STEPS = Subject(
 )
 
 
-# What pushes and breaks in a visual servo
-
-
-def disturbance_numbers(run: Run) -> dict[str, float]:
-    """Largest force and moment on the platform in the rows of the log, and their times."""
-    wrenches, numbers = run.log[APPLIED_WRENCH], {}
-    for name, unit, part in (("force", "n", slice(3, 6)), ("moment", "nm", slice(3))):
-        sizes = np.linalg.norm(wrenches[:, part], axis=1)
-        k = int(np.argmax(sizes))
-        numbers[f"largest_{name}_{unit}"] = float(sizes[k])
-        numbers[f"largest_{name}_at_s"] = float(run.log["time"][k])
-    return numbers
+# What breaks in a visual servo
 
 
 def failure_numbers(run: Run) -> dict[str, Any]:
@@ -204,9 +192,6 @@ def _gain(run: Run) -> Any:
 
 
 TENSION_GAIN = Subject("tension_gain", gain_numbers, applies=lambda run: _gain(run) is not None)
-DISTURBANCES = Subject(
-    "disturbances", disturbance_numbers, applies=lambda run: APPLIED_WRENCH in run.log
-)
 FAILURES = Subject(
     "failures", failure_numbers, applies=lambda run: run.scenario.failures is not None
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -58,10 +57,7 @@ from cdpr_drake.systems.robots.settings import (
 )
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, engine_of
-from cdpr_drake.systems.sections import load_object, sections_of
-
-FORCES = load_object("cdpr_drake.sections.force_control.report:FORCES")
-"""Until `disturbances` is a section, whose report has it."""
+from cdpr_drake.systems.sections import sections_of
 
 
 class TensionRun(Run):
@@ -72,7 +68,7 @@ class TensionRun(Run):
     """
 
     kind = TENSION_CONTROL
-    subjects = (FORCES, PROGRAM_STEPS, WORLD)
+    subjects = (PROGRAM_STEPS, WORLD)
     loop: str | None = None
 
     @cached_property
@@ -97,12 +93,10 @@ class TensionRun(Run):
             rule=scenario.step_rule(),
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
-            disturbances=scenario.disturbances,
+            sections=[section for _, section in sections_of(scenario)],
             seed=scenario.seed,
             damping=scenario.damping,
         )
-        for _, section in sections_of(scenario):
-            settings = replace(settings, **section.tension_blocks(settings, robot))
         return build_tension_control(robot, settings, log_rate=scenario.log_rate)
 
     def check(self) -> list[str]:

@@ -2,6 +2,9 @@ from .adaptation.geometry_learner import GeometryLearner as GeometryLearner
 from .adaptation.recursive_calibration import Learnt as Learnt
 from .adaptation.recursive_calibration import RecursiveCalibration as RecursiveCalibration
 from .adaptation.section import Adaptation as Adaptation
+from .disturbances.section import Disturbances as Disturbances
+from .disturbances.section import DisturbanceSettings as DisturbanceSettings
+from .disturbances.section import Push as Push
 from .emergency.break_detector import BreakDetector as BreakDetector
 from .emergency.failure_monitor import FailureMonitor as FailureMonitor
 from .emergency.reaction import EmergencyReaction as EmergencyReaction

@@ -39,6 +39,7 @@ from cdpr_drake.systems.batches.batch_member import BatchMember
 from cdpr_drake.systems.robots.cable_robot import default_rule
 from cdpr_drake.systems.robots.compiled_step import StepRule, motion_problem, packed_rule
 from cdpr_drake.systems.robots.settings import CableRobotSettings
+from cdpr_drake.systems.sections import Section, sections_of
 
 
 @dataclass(frozen=True)
@@ -604,8 +605,8 @@ def _check(
             "world: found a section; accepted in a batch: null, since the compiled engine has no "
             "contact and measures no clearances; lowest_points tells who is at a floor"
         )
-    if settings.failures is not None or settings.disturbances is not None:
-        name = "failures" if settings.failures is not None else "disturbances"
+    pushing = [key for key, one in sections_of(settings) if type(one).push is not Section.push]
+    for name in pushing if settings.failures is None else ("failures",):
         raise CdprError(
             f"{name}: found a section; accepted in a batch: null, with wrenches and break_cable "
             "between steps"

@@ -80,13 +80,11 @@ def read_inputs(scenario: Scenario) -> None:
 
 
 def _control_refusals(scope: Scope) -> Iterator[Refusal]:
-    """What of a scenario of dynamic control does not go together."""
-    scenario, robot = scope.whole, scope.robot
+    """Robots that dynamic control is not for."""
+    robot = scope.robot
     if robot.winch_groups().are_shared():
         found = f"{robot.name} with several cables on one winch, which cannot be given tensions"
         yield "robot", f"{found} one by one", "a robot with a winch for each cable"
-    if scenario.disturbances is not None and scenario.integration.engine == COMPILED:
-        yield "integration.engine", f"{COMPILED} beside disturbances", "plant"
 
 
 def _engine_refusals(scope: Scope) -> Iterator[Refusal]:

@@ -29,8 +29,9 @@ from cdpr_drake.systems.diagrams.torque_control import (
 )
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
 from cdpr_drake.systems.robots.assembly import RobotBlock
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
-from cdpr_drake.systems.sections import sections_of
+from cdpr_drake.systems.sections import Platform, add_pushes, sections_of
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 
 
@@ -193,8 +194,17 @@ def add_visual_servo(
         turning=turning,
         prefix=prefix,
     )
-    for _, section in sections_of(settings):
+    sections = [section for _, section in sections_of(settings)]
+    for section in sections:
         blocks.logged.update(section.add_to(builder, blocks, settings))
+    platform = Platform(
+        robot=robot.robot, X_WP=robot.GetOutputPort("X_WP"),
+        state=robot.GetOutputPort("platform_state"), seed=settings.seed, prefix=prefix,
+    )  # fmt: skip
+    wrench = add_pushes(builder, sections, platform)
+    if wrench is not None:
+        builder.Connect(wrench, robot.GetInputPort(APPLIED_WRENCH))
+        blocks.logged[APPLIED_WRENCH] = wrench
     return blocks
 
 

@@ -19,7 +19,6 @@ from cdpr_drake.systems.monitoring.run_monitor import RunMonitor, StopRules
 from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
 from cdpr_drake.systems.robots.failures import FAULTS
-from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
@@ -192,8 +191,6 @@ def add_servo_log(
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:
         ports[name] = block.GetOutputPort(name)
-    if scenario.disturbances is not None:
-        ports[APPLIED_WRENCH] = block.GetOutputPort(APPLIED_WRENCH)
     if scenario.failures is not None:
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
     if blocks.plan is not None:

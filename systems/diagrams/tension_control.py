@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.cables.commanded_tension_kernel import cable_motions
 from cdpr_drake.control.force_balance import WRENCH
 from cdpr_drake.control.task_space import PlatformDynamics, TaskGains
+from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_error, pose_from_row, pose_row
 from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_joint
@@ -29,10 +30,10 @@ from cdpr_drake.systems.robots.assembly import add_hysteresis, apply_force
 from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
 from cdpr_drake.systems.robots.compiled_motion import HELD, MEMORY, CompiledMotion
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH, PlatformWrench
 from cdpr_drake.systems.robots.settings import DampingSettings
 from cdpr_drake.systems.robots.tension_driven_cables import TensionDrivenCables
+from cdpr_drake.systems.sections import Platform, Section, add_pushes
 from cdpr_drake.systems.worlds.adding import (
     CLEARANCES,
     CONTACTS,
@@ -184,7 +185,8 @@ class TensionControlSettings:
             simulator's integrator.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
-        disturbances: What pushes the platform; None: nothing. Needs the plant.
+        sections: Sections of a scenario: some make controller or distributor, some push the
+            platform, which needs the plant.
         seed: Of their random numbers.
         damping: Of the simulated platform; by default the robot file's. It is in the dynamics that
             the controller believes unless `dynamics` says otherwise.
@@ -206,7 +208,7 @@ class TensionControlSettings:
     rule: StepRule | None = None
     world: WorldSettings | None = None
     stop_at_contact: bool = False
-    disturbances: DisturbanceSettings | None = None
+    sections: Sequence[Section] = ()
     seed: int = 0
     damping: DampingSettings = field(default_factory=DampingSettings)
 
@@ -222,7 +224,7 @@ class TensionControlBlocks:
             compiled steps.
         cables: Those cables.
         state: State of the platform, which controller and distributor read.
-        pushes: What pushes the platform beside its cables; None: nothing.
+        applied_wrench: What pushes the platform beside its cables; None: nothing.
     """
 
     controller: PoseTracking
@@ -230,7 +232,7 @@ class TensionControlBlocks:
     driven: TensionDrivenCables | CompiledMotion
     cables: CableSet
     state: OutputPort
-    pushes: Disturbances | None = None
+    applied_wrench: OutputPort | None = None
 
 
 def add_tension_control(
@@ -262,10 +264,13 @@ def add_tension_control(
     if real is None:
         real = in_plant.robot.cable_set().without_pulleys()
     believed = real if settings.believed_cables is None else settings.believed_cables
-    balance = settings.balance
+    robot, balance = in_plant.robot, settings.balance
     dynamics = settings.dynamics or platform_dynamics(
-        in_plant.robot, balance, damping=settings.damping.of(in_plant.robot)
+        robot, balance, damping=settings.damping.of(robot)
     )
+    settings = replace(settings, believed_cables=believed, dynamics=dynamics)
+    for section in settings.sections:
+        settings = replace(settings, **section.tension_blocks(settings, robot))
     control = settings.controller(
         in_plant, settings.trajectory, settings.gains, dynamics, balance=balance
     )
@@ -313,28 +318,20 @@ def add_tension_control(
         if friction is not None:
             rubbing = friction.GetOutputPort("generalized_force")
             apply_force(builder, in_plant.plant, rubbing, name=prefix + "rubbing")
-    pushes = _add_pushes(builder, in_plant, settings, control, name)
-    return TensionControlBlocks(control, distribution, driven, real, state, pushes)
-
-
-def _add_pushes(
-    builder: DiagramBuilder,
-    in_plant: RobotInPlant,
-    settings: TensionControlSettings,
-    control: PoseTracking,
-    name: str,
-) -> Disturbances | None:
-    """Adds what pushes the platform, in a plant."""
-    if settings.disturbances is None:
-        return None
-    prefix, gravity = f"{name}_" if name else "", in_plant.robot.gravity_vector()
-    pushes = Disturbances(settings.disturbances, gravity, seed=settings.seed)
-    builder.AddNamedSystem(prefix + "disturbances", pushes)
-    wrench = builder.AddNamedSystem(prefix + "platform_wrench", PlatformWrench(in_plant))
-    builder.Connect(control.GetOutputPort("X_WP"), pushes.GetInputPort("X_WP"))
-    builder.Connect(pushes.GetOutputPort("wrench"), wrench.get_input_port())
-    apply_force(builder, in_plant.plant, wrench.get_output_port(), name=prefix + "pushed")
-    return pushes
+    platform = Platform(
+        robot=in_plant.robot, X_WP=control.GetOutputPort("X_WP"), state=state,
+        seed=settings.seed, prefix=prefix,
+    )  # fmt: skip
+    wrench = add_pushes(builder, settings.sections, platform)
+    if wrench is not None and settings.rule is not None:
+        raise ScenarioError(
+            "integration.engine: found compiled beside what pushes the platform; accepted: plant"
+        )
+    if wrench is not None:
+        pushed = builder.AddNamedSystem(prefix + "platform_wrench", PlatformWrench(in_plant))
+        builder.Connect(wrench, pushed.get_input_port())
+        apply_force(builder, in_plant.plant, pushed.get_output_port(), name=prefix + "pushed")
+    return TensionControlBlocks(control, distribution, driven, real, state, wrench)
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
@@ -385,8 +382,8 @@ def build_tension_control(
             logged[name] = blocks.controller.GetOutputPort(name)
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
-        if blocks.pushes is not None:
-            logged[APPLIED_WRENCH] = blocks.pushes.GetOutputPort("wrench")
+        if blocks.applied_wrench is not None:
+            logged[APPLIED_WRENCH] = blocks.applied_wrench
         if meters is not None and meters.contact is not None:
             logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)

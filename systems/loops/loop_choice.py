@@ -54,8 +54,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its world has contact"
     if scenario.world is not None:
         return "the clearances of its world are measured by blocks"
-    if scenario.disturbances is not None:
-        return "its disturbances are a block of a diagram"
     if scenario.failures is not None:
         return "its failures are a block of a diagram"
     if scenario.integration.engine == PLANT:

@@ -49,8 +49,10 @@ from cdpr_drake.systems.pick_and_place.workpiece import (
 )
 from cdpr_drake.systems.robots.assembly import apply_force
 from cdpr_drake.systems.robots.cable_robot import STEP_SHARE, CableRobot, automatic_step
+from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.pick_and_place_scenario import PickAndPlaceScenario
 from cdpr_drake.systems.scenarios.pick_and_place_settings import COVERED_IN, OBJECT_TAG
+from cdpr_drake.systems.sections import Platform, add_pushes, sections_of
 from cdpr_drake.systems.sensors.sensor_readings import SensorReadings
 from cdpr_drake.systems.worlds.adding import WorldInScene
 from cdpr_drake.systems.worlds.contact import contact_law, contact_step
@@ -211,6 +213,14 @@ def build_pick_and_place(scenario: PickAndPlaceScenario) -> PickAndPlace:
         "platform_velocity": servo.GetOutputPort("platform_velocity"),
         **{name: block.GetOutputPort(name) for name in LOGGED_OF_CABLES},
     }
+    platform = Platform(
+        robot=robot, X_WP=block.GetOutputPort("X_WP"), state=block.GetOutputPort("platform_state"),
+        seed=scenario.seed,
+    )  # fmt: skip
+    wrench = add_pushes(builder, [section for _, section in sections_of(scenario)], platform)
+    if wrench is not None:
+        builder.Connect(wrench, block.GetInputPort(APPLIED_WRENCH))
+        ports[APPLIED_WRENCH] = wrench
     if scenario.cover is not None:
         ports["hidden"] = block.GetOutputPort("tag_occluded")
     log = add_log(builder, ports, scenario.log_rate)

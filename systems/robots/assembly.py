@@ -336,12 +336,6 @@ def add_cable_robot(
         else:
             inputs[port.get_name()] = port
     inputs[APPLIED_WRENCH] = wrench.get_input_port()
-    disturbances = settings.disturbance_block(robot)
-    if disturbances is not None:
-        builder.AddNamedSystem(prefix + "disturbances", disturbances)
-        builder.Connect(disturbances.GetOutputPort("wrench"), wrench.get_input_port())
-        builder.Connect(pose.GetOutputPort("X_WP"), disturbances.GetInputPort("X_WP"))
-        inputs[APPLIED_WRENCH] = disturbances.GetInputPort(APPLIED_WRENCH)
     outputs = {"platform_state": state, "X_WP": pose.GetOutputPort("X_WP")}
     outputs |= {port: forces.GetOutputPort(port) for port in PORTS}
     if forces.HasOutputPort(CREPT):
@@ -352,8 +346,6 @@ def add_cable_robot(
         builder.Connect(winch.GetOutputPort(port_name), forces.GetInputPort(port_name))
     for port in map(winch.get_output_port, range(winch.num_output_ports())):
         outputs[port.get_name()] = port
-    if disturbances is not None:
-        outputs[APPLIED_WRENCH] = disturbances.GetOutputPort("wrench")
     if failures is not None:
         builder.AddNamedSystem(prefix + "failures", failures)
         inputs[BROKEN] = forces.GetInputPort(BROKEN)

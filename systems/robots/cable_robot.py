@@ -87,8 +87,6 @@ class CableRobot(Diagram):
     body_accelerations      list[SpatialAcceleration] rad/s^2 out, from the plant, of bodies in W
                                                       m/s^2
     query_object            QueryObject               -       out, from the scene graph, for cameras
-    applied_wrench          vector(6)                 N m, N  out, only with `disturbances`: these
-                                                              and the input
     broken, jammed, powerless                         -       out, only with `failures`: these
                                                               and the inputs
     ======================= ========================= ======= =================================

@@ -117,8 +117,6 @@ class CompiledCableRobot(Diagram):
             "bodies",
             CompiledBodies(motion.arrays(), cable_law(model, cables), robot.joint()),
         )
-        disturbances = settings.disturbance_block(robot)
-        pushed = [system.GetInputPort(APPLIED_WRENCH) for system in (motion, bodies)]
         for index in range(motion.num_input_ports()):
             port = motion.get_input_port(index)
             if port.get_name() == RANDOM_NUMBERS:
@@ -127,7 +125,7 @@ class CompiledCableRobot(Diagram):
                 builder.Connect(numbers.get_output_port(), port)
                 drawn = numbers.get_output_port().Eval(numbers.CreateDefaultContext())
                 motion.default_numbers = np.array(drawn)
-            elif port.get_name() not in (APPLIED_WRENCH, *FAULTS):
+            elif port.get_name() not in FAULTS:
                 builder.ExportInput(port, port.get_name())
         for index in range(bodies.num_input_ports()):
             port = bodies.get_input_port(index)
@@ -141,16 +139,7 @@ class CompiledCableRobot(Diagram):
                 builder.Connect(flags, motion.GetInputPort(name))
                 builder.ExportInput(failures.GetInputPort(name), name)
                 builder.ExportOutput(flags, name)
-        if disturbances is None:
-            builder.ExportInput(pushed[0], APPLIED_WRENCH)
-            builder.ConnectInput(APPLIED_WRENCH, pushed[1])
-        else:
-            builder.AddNamedSystem("disturbances", disturbances)
-            builder.Connect(motion.GetOutputPort("X_WP"), disturbances.GetInputPort("X_WP"))
-            builder.ExportInput(disturbances.GetInputPort(APPLIED_WRENCH), APPLIED_WRENCH)
-            builder.ExportOutput(disturbances.GetOutputPort("wrench"), APPLIED_WRENCH)
-            for port in pushed:
-                builder.Connect(disturbances.GetOutputPort("wrench"), port)
+        builder.ConnectInput(APPLIED_WRENCH, bodies.GetInputPort(APPLIED_WRENCH))
         for index in range(motion.num_output_ports()):
             output = motion.get_output_port(index)
             if output.get_name() not in ("geometry_pose", MEMORY):

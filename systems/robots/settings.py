@@ -12,7 +12,6 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_in_plant import RobotInPlant
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import In, OneOf, Switch, filled, settings
-from cdpr_drake.systems.robots.disturbances import Disturbances, DisturbanceSettings
 from cdpr_drake.systems.robots.failures import Failures, FailureSettings
 from cdpr_drake.systems.robots.motor_winch import COMMAND_PORTS
 
@@ -213,24 +212,9 @@ class CableRobotSettings:
     damping: Annotated[DampingSettings, "Additional damping of the platform."] = filled(
         DampingSettings
     )
-    disturbances: Annotated[
-        DisturbanceSettings | None, "What pushes the platform beside its cables; null: nothing."
-    ] = None
     failures: Annotated[
         FailureSettings | None, "What fails: cables that break, winches; null: nothing."
     ] = None
-
-    def disturbance_block(self, robot: Robot) -> Disturbances | None:
-        """The block of `disturbances`, by the seed of the scenario that these settings are, or 0;
-        None without.
-
-        Raises:
-            ScenarioError: They are not accepted; names it.
-        """
-        if self.disturbances is None:
-            return None
-        seed = int(getattr(self, "seed", 0))
-        return Disturbances(self.disturbances, robot.gravity_vector(), seed=seed)
 
     def failure_block(self, robot: Robot) -> Failures | None:
         """The block of `failures`; None without, and nothing can fail."""

@@ -11,7 +11,7 @@ from cdpr_drake.dynamics.explicit_kernel import METHODS
 from cdpr_drake.schema.declarations import In, Name, OneOf, Switch, Text, settings
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, PLANT
-from cdpr_drake.systems.sections import sections_of
+from cdpr_drake.systems.sections import sections_of, with_sections
 from cdpr_drake.systems.worlds.settings import WorldSettings
 
 DIAGRAM = "diagram"
@@ -55,6 +55,7 @@ class RunHeader:
 
 
 @settings
+@with_sections("robot_scenario")
 class ScenarioHeader(RunHeader):
     """What a scenario is called, which robot it moves, and how long it runs."""
 
@@ -145,9 +146,7 @@ def engine_of(scenario: Any) -> str:
 
 def needs_plant(scenario: Any) -> bool:
     """Whether the engine plant alone can run a scenario of any kind, contact aside."""
-    return getattr(scenario, "plant_alone", False) or any(
-        section.needs_plant(scenario) for _, section in sections_of(scenario)
-    )
+    return any(section.needs_plant(scenario) for _, section in sections_of(scenario))
 
 
 def many_steps_reason(scenario: Any, repeated: bool) -> str:

@@ -15,7 +15,6 @@ from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, Text, filled, settings
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.disturbances import DisturbanceSettings
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, DampingSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
@@ -154,20 +153,12 @@ class TensionScenario(ScenarioHeader):
     distribution: Annotated[DistributionSettings, "Tension distribution."] = filled(
         DistributionSettings
     )
-    disturbances: Annotated[
-        DisturbanceSettings | None, "What pushes the platform, by the engine plant; null: nothing."
-    ] = None
     integration: Annotated[StepSettings, "Integration."] = filled(StepSettings)
     perturbations: Annotated[TensionBelief, "What the controller believes wrongly."] = filled(
         TensionBelief
     )
     stop: Annotated[TensionStop, "When the run ends early."] = filled(TensionStop)
     log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 100.0
-
-    @property
-    def plant_alone(self) -> bool:
-        """Whether the engine plant alone can run it."""
-        return self.disturbances is not None
 
     def step_rule(self) -> StepRule | None:
         """How the robot is integrated in compiled steps; None by the engine plant."""

@@ -19,6 +19,7 @@ from cdpr_drake.palette import DESIRED, ESTIMATED, PLATFORM
 from cdpr_drake.sections.force_control.section import HYBRID
 from cdpr_drake.sections.wrench_estimation.section import ESTIMATED as WRENCH_ESTIMATED
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 
 NEAR_FORCE = 0.1
 """A force is held from the first time that its error is below this share of it."""
@@ -101,9 +102,9 @@ FORCES = Subject(
     "forces",
     force_numbers,
     {"forces": force_figure},
-    applies=lambda run: APPLIED_WRENCH in run.log or WRENCH_ESTIMATED in run.log,
+    applies=lambda run: run.kind == TENSION_CONTROL,
 )
-"""Of a run in which something pushes, or a wrench is estimated; `force_control` or not."""
+"""Of dynamic control in which something pushes, or a wrench is estimated."""
 
 SUBJECTS = (FORCES,)
 """What a run reports of the section."""

@@ -360,6 +360,10 @@ REFUSALS = {
         lambda: batch(settings=settings(failures=FailureSettings())),
         "failures: found a section; accepted in a batch: null",
     ),
+    "pushes": (
+        lambda: batch(settings=load_scenario("acrobot_pushed")),
+        "disturbances: found a section; accepted in a batch: null, with wrenches",
+    ),
     "world": (
         lambda: batch(settings=load_scenario("acrobot_table_edge")),
         "world: found a section; accepted in a batch: null, since the compiled engine has no "

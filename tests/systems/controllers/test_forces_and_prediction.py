@@ -19,6 +19,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.planning.horizon import EFFORT, TIME_CONSTANT, Horizon, View
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
+from cdpr_drake.sections.disturbances.section import DisturbanceSettings, Push
 from cdpr_drake.sections.predictive.section import PredictiveDistributor
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.plant_following import MotorFollower
@@ -29,7 +30,6 @@ from cdpr_drake.systems.diagrams.tension_control import (
     build_tension_control,
 )
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.disturbances import DisturbanceSettings, Push
 from cdpr_drake.systems.scenarios.run_settings import engine_of, set_engine
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from tests.mechanisms.mechanism_cases import cables_of

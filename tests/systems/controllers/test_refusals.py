@@ -106,6 +106,8 @@ SCENARIOS = {
         ("controller.balance=force", "balance: found force beside force_control"),
         ("predictive={}", "force_control: found beside predictive"),
         ("disturbances={pushes: []}", "disturbances.pushes: found none"),
+        ("force_control=null; integration.engine=compiled",
+         "integration.engine: found compiled beside disturbances; accepted: plant"),
     ],
     "acrobot_led_by_hand": [
         ("force_control.mass=[0, 1, 1, 1, 1, 1]", "mass: found 0; accepted: above 0"),

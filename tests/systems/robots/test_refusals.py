@@ -43,7 +43,6 @@ from cdpr_drake.systems.robots.cable_robot import (
 )
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot, motion_by_tensions
 from cdpr_drake.systems.robots.compiled_step import StepRule
-from cdpr_drake.systems.robots.disturbances import DisturbanceSettings, Push
 from cdpr_drake.systems.robots.failures import Equipment, Failure, FailureSettings
 from cdpr_drake.systems.robots.random_pose import RandomPose
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -63,7 +62,6 @@ from tests.systems.robots.engines import (
 
 SMALL = load_robot("acrobot_small")
 HOME = SMALL.home.transform()
-ONES = np.ones(3)
 
 
 def without_inertia():
@@ -197,11 +195,6 @@ NAMED_BLOCKS = {
 }
 
 
-def pushes(second):
-    settings = DisturbanceSettings(pushes=[Push(kind="step", force=ONES), second])
-    refuse(settings, "disturbances", error=ScenarioError)
-
-
 def overridden(scenario, override):
     load_scenario(scenario, [override])
 
@@ -217,7 +210,7 @@ def fails(second):
         refuse(FailureSettings(events=[first, second]), "failures", error=ScenarioError)
 
 
-PUSH, EVENT = r"disturbances\.pushes\[1\]\.", r"failures\.events\[1\]\."
+EVENT = r"failures\.events\[1\]\."
 
 ROBOT_FILES = {
     "motors": (
@@ -291,17 +284,6 @@ GEOMETRY = {
     "bundled pose": (bundles_turned, "P0a and P0b of .* on one winch, which pays out"),
 }  # fmt: skip
 
-PUSHES = {
-    r"force: found no force and no moment; accepted: a force, a moment, or both": Push(kind="step"),
-    "end: found none; accepted: one, with push": Push(kind="push", force=ONES),
-    "frequency: found none": Push(kind="sine", force=ONES),
-    "mass: found none": Push(kind="payload"),
-    "mass: found 0": Push(kind="payload", mass=0.0),
-    "force: found one; accepted: none, with pay": Push(kind="payload", mass=1.0, force=ONES),
-    "mass: found one with step": Push(kind="step", force=ONES, mass=1.0),
-    "end: found 1 s": Push(kind="step", force=ONES, start=2.0, end=1.0),
-    "wind: found none": Push(kind="wind", wind=np.zeros(3), drag_area=1.0),
-}  # fmt: skip
 EVENTS = {
     "cable: found none with cable_breaks": Failure(time=0.0, kind="cable_breaks"),
     "cable: found 8; accepted: 0 to 7": Failure(time=0.0, kind="cable_breaks", cable=8),
@@ -330,11 +312,6 @@ OVERRIDES = {
         ("acrobot_broken_cable", "failures.events=[{kind: cable_thaws, time: 1.0, cable: 1}]"),
 }  # fmt: skip
 SCENARIOS = {
-    "no push": (
-        lambda: refuse(DisturbanceSettings(pushes=[]), error=ScenarioError),
-        "pushes: found none",
-    ),
-    **{words: (lambda push=push: pushes(push), PUSH + words) for words, push in PUSHES.items()},
     **{words: (lambda event=event: fails(event), EVENT + words) for words, event in EVENTS.items()},
     **{words: (lambda case=case: overridden(*case), words) for words, case in OVERRIDES.items()},
 }  # fmt: skip

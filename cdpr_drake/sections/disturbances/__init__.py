@@ -1,0 +1,1 @@
+"""Section `disturbances`: pushes, sines, wind and loads on the platform."""
