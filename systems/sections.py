@@ -33,6 +33,7 @@ SECTIONS = {
     "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
     "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
+    "visual_servo.pose_plan": "cdpr_drake.sections.pose_plan.section:PosePlanSettings",
     "robot_scenario.disturbances": "cdpr_drake.sections.disturbances.section:DisturbanceSettings",
     "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
@@ -120,7 +121,7 @@ class Section:
         """Makers of blocks of dynamic control in the place of the usual ones.
 
         Args:
-            settings: The `TensionControlSettings` of a run, with the usual makers.
+            settings: The `TensionControlSettings` with the makers so far, and what is believed.
             robot: The robot.
 
         Returns:
