@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake.analyses.frame.result import Listing
 from cdpr_drake.analyses.frame.verb import verb
-from cdpr_drake.analyses.logs.dialects import LOG_SUFFIXES, recognise
-from cdpr_drake.analyses.logs.import_log import import_log
-from cdpr_drake.analyses.logs.log import Log
 from cdpr_drake.errors import CdprError, meant_names
-from cdpr_drake.models.formats.file_kinds import is_foreign
-from cdpr_drake.models.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.mechanism_files import MECHANISM_KEY, SCENARIO_KEY
 from cdpr_drake.models.mechanism_loader import load_mechanism
-from cdpr_drake.models.robot_exchange import import_robot
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_loader import (
     load_robot,
@@ -34,6 +29,13 @@ from cdpr_drake.systems.scenarios.files import scenario_file, scenario_names
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+READERS = (
+    "cdpr_drake.analyses.logs.import_log:checked_log",
+    "cdpr_drake.formats.robot_exchange:checked_robot",
+)
+"""Functions that read files of others. Each takes a path and returns what the file is, what a user
+may want to know of it, and a log to be drawn, or None if it does not know the file."""
+
 WRONG = 2
 """Exit code if something is wrong with a file."""
 
@@ -46,7 +48,7 @@ class CheckedFiles(Listing):
         log: What was read, if one log was checked.
     """
 
-    log: Log | None = None
+    log: Any = None
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
         """The log, if one log was checked."""
@@ -65,7 +67,7 @@ def check_files(files: Sequence[Path], /) -> CheckedFiles:
     """
     entries: list[dict[str, Any]] = []
     words: list[str] = []
-    logs: list[Log | None] = []
+    logs: list[Any] = []
     for file in files:
         entry: dict[str, Any] = {"file": str(file), "kind": None, "problems": [], "notes": []}
         try:
@@ -83,18 +85,13 @@ def check_files(files: Sequence[Path], /) -> CheckedFiles:
     )
 
 
-def _read(path: Path) -> tuple[str, list[str], Log | None]:
+def _read(path: Path) -> tuple[str, list[str], Any]:
     """What a file is, what a user may want to know of it, and a log; raises what is wrong."""
-    if is_log(path):
-        log = import_log(path)
-        first, *notes = log.lines()
-        kind = "log, " + first.removeprefix(f"{path}: ")
-        return kind, [note.strip() for note in notes], log
-    if is_foreign(path):
-        imported = import_robot(path)
-        assumed = [f"assumed {key}: {words}" for key, words in imported.completed.assumed.items()]
-        notes = [*assumed, *imported.completed.remarks, *point_notes(imported.robot)]
-        return f"robot, {imported.tool}", notes, None
+    for reader in READERS:
+        module, _, name = reader.partition(":")
+        read = getattr(import_module(module), name)(path)
+        if read is not None:
+            return read
     if _is_scenario(path):
         load_scenario(path)
         return "scenario", [], None
@@ -121,13 +118,6 @@ def _file_of(path: Path) -> Path:
         return scenario_file(name)
     hint = "".join(f"; did you mean {near}?" for near in meant_names(name, (*robots, *scenarios)))
     raise CdprError(f"{path}: there is no such file, robot or scenario{hint}")
-
-
-def is_log(path: Path) -> bool:
-    """True if a file is a log of a machine: by its ending, and by a reader that knows it."""
-    if path.suffix.lower() not in LOG_SUFFIXES or not path.is_file() or is_grab_mat(path):
-        return False
-    return bool(recognise(path)[0])
 
 
 def _mechanism_notes(path: Path) -> list[str]:

@@ -3,7 +3,6 @@ from .analyses.design.reconfiguration import reconfigure as reconfigure
 from .analyses.environments import environment_names as environment_names
 from .analyses.environments import make_environment as make_environment
 from .analyses.equilibria import find_equilibria as find_equilibria
-from .analyses.exchange import import_robot as import_robot
 from .analyses.fits.calibration import calibrate as calibrate
 from .analyses.fits.camera import calibrate_camera as calibrate_camera
 from .analyses.fits.campaign import calibrate_campaign as calibrate_campaign
@@ -19,7 +18,6 @@ from .analyses.logs.import_log import import_log as import_log
 from .analyses.logs.replay import replay_log as replay_log
 from .analyses.planning.free_plan import plan_free_motion as plan_free_motion
 from .analyses.planning.path_plan import plan_path as plan_path
-from .analyses.planning.proven_plan import plan_proven_motion as plan_proven_motion
 from .analyses.runs.along import assess_run as assess_run
 from .analyses.runs.run import Run as Run
 from .analyses.runs.scenarios import load_scenario as load_scenario
@@ -45,6 +43,8 @@ from .analyses.workspaces.workspace import compute_workspace as compute_workspac
 from .control.task_space import TaskGains as TaskGains
 from .errors import CdprError as CdprError
 from .errors import StoppedError as StoppedError
+from .formats.exchange import import_robot as import_robot
+from .formats.robot_exchange import export_robot as export_robot
 from .geometry.cable_set import CableSet as CableSet
 from .models.mechanism_files import mechanism_names as mechanism_names
 from .models.mechanism_in_plant import add_mechanism as add_mechanism
@@ -52,12 +52,12 @@ from .models.mechanism_loader import load_mechanism as load_mechanism
 from .models.mechanism_loader import load_robot_or_mechanism as load_robot_or_mechanism
 from .models.mechanism_schema import Mechanism as Mechanism
 from .models.robot_draws import ParameterCovariance as ParameterCovariance
-from .models.robot_exchange import export_robot as export_robot
 from .models.robot_in_plant import add_robot as add_robot
 from .models.robot_loader import load_robot as load_robot
 from .models.robot_loader import robot_names as robot_names
 from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
+from .proofs.proven_plan import plan_proven_motion as plan_proven_motion
 from .sections.emergency.reactions import compare_reactions as compare_reactions
 from .servoing.servo_law import ServoLaw as ServoLaw
 from .servoing.servo_task import BelievedRobot as BelievedRobot

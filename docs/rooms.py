@@ -3,7 +3,9 @@
     python -m docs.rooms          writes docs/images/rooms.svg and the list
     python -m docs.rooms --check  exit code 1 where one of them is not what the code says
 
-A layer imports only from layers below it, as import-linter's contract in pyproject.toml says.
+A layer imports only from layers below it, as import-linter's contract in pyproject.toml says. Its
+first rows are the wings, by `tool.rooms.wings` there; the rows below them are the core. Numbers of
+lines in the list may be off by `TOLERANCE` before they count as old.
 """
 
 from __future__ import annotations
@@ -12,8 +14,11 @@ import ast
 import re
 import sys
 import tomllib
+from collections.abc import Iterable
+from functools import cache
 from html import escape
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 PICTURE = ROOT / "docs" / "images" / "rooms.svg"
@@ -31,14 +36,55 @@ FOLDERS = {
 
 LIBRARY = ("cdpr_drake", "#ffffff")
 
+TOLERANCE = 0.05
+"""Of numbers of lines, as a share; those up to two thousand lines may be off by a hundred."""
+
 WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 120, 26, 6, 6.9
+
+
+@cache
+def tools() -> dict[str, Any]:
+    """The tables of tools in pyproject.toml."""
+    tables: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]
+    return tables
 
 
 def layers() -> list[list[str]]:
     """Modules and packages from the top layer down, siblings side by side."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    contract = project["tool"]["importlinter"]["contracts"][0]
+    contract = tools()["importlinter"]["contracts"][0]
     return [[name.strip() for name in layer.split("|")] for layer in contract["layers"]]
+
+
+def wing_of(module: str) -> str:
+    """The wing that a module belongs to, an empty text for the core."""
+    for wing, packages in tools()["rooms"]["wings"].items():
+        if any(f"{module}.".startswith(f"{package}.") for package in packages):
+            return str(wing)
+    return ""
+
+
+def check_order() -> None:
+    """Wings stand above the core, so that the contract of layers keeps the core from them.
+
+    Raises:
+        SystemExit: A row of the core stands above one of a wing.
+    """
+    rows = [bool(wing_of(module)) for layer in layers() for module in layer]
+    if rows != sorted(rows, reverse=True):
+        raise SystemExit("pyproject.toml: layers: found a wing below the core; accepted: above it")
+
+
+def lines_of(module: str) -> int:
+    """Lines of a module, or of all files of a package."""
+    path = path_of(module)
+    files = path.parent.rglob("*.py*") if path.name == "__init__.py" else [path]
+    sources = [file for file in files if file.suffix in (".py", ".pyi")]
+    return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in sources)
+
+
+def thousands(modules: Iterable[str]) -> str:
+    """Lines of modules and packages, as 1.2k."""
+    return f"{sum(map(lines_of, modules)) / 1000.0:.1f}k"
 
 
 def folder_of(module: str) -> tuple[str, str]:
@@ -64,13 +110,13 @@ def first_line(module: str) -> str:
 
 
 def rooms() -> list[str]:
-    """Packages that layers name, from the top down."""
+    """Modules and packages that layers name, from the top down, the studio once."""
     found: list[str] = []
     for layer in layers():
         for module in sorted(layer):
             if module.startswith("cdpr_drake.studio."):
                 module = "cdpr_drake.studio"
-            if module not in found and path_of(module).name == "__init__.py":
+            if module not in found:
                 found.append(module)
     return found
 
@@ -120,12 +166,29 @@ def picture() -> str:
 
 
 def listed() -> str:
-    """The rooms as a list in Markdown: where, and what for."""
-    rows = []
+    """The rooms as lists in Markdown, core and wings: where, and what for."""
+    wings = tools()["rooms"]["wings"]
+    rows = dict.fromkeys(("", *wings), "")
     for module in rooms():
-        where = path_of(module).parent.relative_to(ROOT).as_posix()
-        rows.append(f"- `{where}`: {first_line(module)}\n")
-    return "".join(rows)
+        path = path_of(module)
+        where = (path.parent if path.name == "__init__.py" else path).relative_to(ROOT).as_posix()
+        rows[wing_of(module)] += f"- `{where}`: {first_line(module)}\n"
+    core = [module for layer in layers() for module in layer if not wing_of(module)]
+    every = [package for packages in wings.values() for package in packages]
+    parts = [f"**The core**, {thousands(core)} lines:\n\n{rows['']}"]
+    parts.append(f"**The wings**, {thousands(every)} lines:\n")
+    for wing, packages in wings.items():
+        parts.append(f"*{wing}*, {thousands(packages)}\n\n{rows[wing]}")
+    return "\n".join(parts)
+
+
+def same(old: str, new: str) -> bool:
+    """True if texts differ by nothing but numbers of lines, each within `TOLERANCE`."""
+    number = re.compile(r"(\d+\.\d)k\b")
+    if number.sub("", old) != number.sub("", new):
+        return False
+    pairs = zip(number.findall(old), number.findall(new), strict=True)
+    return all(abs(float(a) - float(b)) <= max(0.11, TOLERANCE * float(b)) for a, b in pairs)
 
 
 def page() -> str:
@@ -143,12 +206,14 @@ def page() -> str:
 
 def main() -> int:
     """Writes both, or says which is old."""
+    check_order()
     made = {PICTURE: picture(), PAGE: page()}
     if "--check" not in sys.argv[1:]:
         for path, text in made.items():
             path.write_text(text, encoding="utf-8")
         return 0
-    old = [path.name for path, text in made.items() if path.read_text(encoding="utf-8") != text]
+    today = {path: path.read_text(encoding="utf-8") for path in made}
+    old = [path.name for path, text in made.items() if not same(today[path], text)]
     for name in old:
         print(f"{name} is not what the code says; python -m docs.rooms writes it")
     return int(bool(old))

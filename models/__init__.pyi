@@ -2,9 +2,6 @@ from .camera_catalogue import Camera as Camera
 from .camera_catalogue import CameraFault as CameraFault
 from .camera_catalogue import load_camera as load_camera
 from .camera_files import camera_names as camera_names
-from .mechanism_exchange import ImportedMechanism as ImportedMechanism
-from .mechanism_exchange import export_mechanism as export_mechanism
-from .mechanism_exchange import import_mechanism as import_mechanism
 from .mechanism_files import mechanism_names as mechanism_names
 from .mechanism_in_plant import MechanismInPlant as MechanismInPlant
 from .mechanism_in_plant import add_mechanism as add_mechanism
@@ -13,8 +10,6 @@ from .mechanism_loader import load_robot_or_mechanism as load_robot_or_mechanism
 from .mechanism_loader import parse_mechanism as parse_mechanism
 from .mechanism_schema import Mechanism as Mechanism
 from .plant_cables import PlantCables as PlantCables
-from .plant_mjcf import PlantMjcf as PlantMjcf
-from .plant_mjcf import export_plant_mjcf as export_plant_mjcf
 from .plant_rest import Rest as Rest
 from .plant_rest import hang as hang
 from .plant_rest import settle as settle
@@ -29,14 +24,6 @@ from .robot_copies import turned_robot as turned_robot
 from .robot_copies import world_turn as world_turn
 from .robot_draws import ParameterCovariance as ParameterCovariance
 from .robot_draws import drawn_robots as drawn_robots
-from .robot_exchange import ImportedRobot as ImportedRobot
-from .robot_exchange import draft_robot as draft_robot
-from .robot_exchange import export_robot as export_robot
-from .robot_exchange import import_robot as import_robot
-from .robot_exports import EXPORTS as EXPORTS
-from .robot_exports import HELD as HELD
-from .robot_exports import export_omissions as export_omissions
-from .robot_exports import given_fields as given_fields
 from .robot_holding import hold_robot as hold_robot
 from .robot_holding import rest_as_long as rest_as_long
 from .robot_in_plant import RobotInPlant as RobotInPlant

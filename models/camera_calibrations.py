@@ -15,7 +15,7 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats.reading import read_text, read_xml
+from cdpr_drake.models.foreign_text import read_text, read_xml
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.vision.lens_distortion import COEFFICIENTS
 

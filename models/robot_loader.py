@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from cdpr_drake.errors import RobotFileError, why_not_read
 from cdpr_drake.models.camera_files import resolved_camera
-from cdpr_drake.models.formats.file_kinds import SUFFIXES, is_foreign
+from cdpr_drake.models.file_kinds import SUFFIXES, is_foreign
 from cdpr_drake.models.mechanism_files import (
     MECHANISM_FILE,
     is_mechanism,
@@ -42,6 +43,9 @@ _FOLDER = Path(__file__).parent / "robots"
 
 MARK = "@"
 """Between the name of a robot and where its exit points stand on their rails."""
+
+READERS = "cdpr_drake.formats.detection"
+"""Module that reads the files of other tools."""
 
 
 def robot_names() -> tuple[str, ...]:
@@ -140,11 +144,8 @@ def robot_text(name: str, asks: str = "robot_text") -> str:
 
 
 def _foreign_content(path: Path) -> str:
-    """The robot file that the file of another tool makes, as YAML; imports all readers."""
-    from cdpr_drake.models.formats.assumptions import complete_draft
-    from cdpr_drake.models.formats.detection import read_foreign
-
-    return made_of_input(path, lambda: complete_draft(read_foreign(path)).yaml())
+    """The robot file that the file of another tool makes, as YAML."""
+    return made_of_input(path, lambda: import_module(READERS).foreign_yaml(path))
 
 
 def load_robot(name: str | Path, asks: str = "load_robot") -> Robot:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import yaml
 
-from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exchange import export_robot
 from tests.analyses.logs import recorders
 from tests.fuzz_damage import (
     CATALOGUES,

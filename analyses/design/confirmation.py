@@ -15,9 +15,9 @@ from cdpr_drake.analyses.design.goals import (
     share_of_stable_poses,
 )
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
-from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.proofs.certified_workspace import box_search, certified_boxes
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid, grid_by_count
 
 RESISTING = ("wrench-feasible", "single-failure")

@@ -75,10 +75,10 @@ from cdpr_drake.calibration.fit_groups import GroupFault
 from cdpr_drake.calibration.parameters import GROUPS
 from cdpr_drake.calibration.result import CalibrationResult, Outlier
 from cdpr_drake.errors import CalibrationError, accepted_names
+from cdpr_drake.formats.robot_exchange import FIRMWARES, export_robot
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.camera_catalogue import load_camera
-from cdpr_drake.models.formats.file_kinds import firmware_of
-from cdpr_drake.models.robot_exchange import FIRMWARES, export_robot
+from cdpr_drake.models.file_kinds import firmware_of
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import as_pose

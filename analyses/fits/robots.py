@@ -15,9 +15,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.calibration.result import CalibrationResult
 from cdpr_drake.errors import CalibrationError, CdprError
+from cdpr_drake.formats.robot_exchange import Deviations, export_robot, with_comment
+from cdpr_drake.formats.robot_exports import export_omissions, omission_words
 from cdpr_drake.geometry.poses import angles_from_rotation, place_error, pose_from_angles
-from cdpr_drake.models.robot_exchange import Deviations, export_robot, with_comment
-from cdpr_drake.models.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_schema import CameraMount, Pose, Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.tensions.methods import distribute

@@ -24,7 +24,7 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.logs.clocks import join_logs, without_packets
 from cdpr_drake.analyses.logs.columns import COMMANDED, ESTIMATED, UNITS
-from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, read_log
+from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, LOG_SUFFIXES, read_log, recognise
 from cdpr_drake.analyses.logs.log import AS_TOLD, Facts, Log, refusal
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import (
@@ -34,6 +34,7 @@ from cdpr_drake.errors import (
     accepted_names,
     why_not_read,
 )
+from cdpr_drake.formats.grab_mat import is_grab_mat
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.schema.input_files import file_size
 from cdpr_drake.schema.yaml_files import load_yaml
@@ -245,3 +246,19 @@ def unused_facts(log: Log, facts: Facts) -> list[str]:
     if facts.cables and not any(s.startswith(f"{c}_") for c in facts.cables for s in stems):
         unused.append(f"the cables {', '.join(facts.cables)[:80]}, since no column is of one")
     return [f"not used: {words}" for words in unused]
+
+
+def is_log(path: Path) -> bool:
+    """True if a file is a log of a machine: by its ending, and by a reader that knows it."""
+    if path.suffix.lower() not in LOG_SUFFIXES or not path.is_file() or is_grab_mat(path):
+        return False
+    return bool(recognise(path)[0])
+
+
+def checked_log(path: Path) -> tuple[str, list[str], Log] | None:
+    """What a log is, notes on it, and the log, for `check_files`; None of all other files."""
+    if not is_log(path):
+        return None
+    log = import_log(path)
+    first, *notes = log.lines()
+    return "log, " + first.removeprefix(f"{path}: "), [note.strip() for note in notes], log

@@ -1,4 +1,4 @@
-"""Where results go: folders, logs, tables, statements on what was published, provenance."""
+"""How results are written: logs, tables, whole files, figures that wait, provenance."""
 
 import lazy_loader
 

@@ -1,12 +1,9 @@
-from .box_certificates import box_search as box_search
-from .box_certificates import certified_boxes as certified_boxes
 from .conditions import MEASURES as MEASURES
 from .conditions import Kind as Kind
 from .conditions import Measure as Measure
 from .conditions import Poses as Poses
 from .conditions import conditions_at as conditions_at
 from .pose_grid import plain as plain
-from .proven_sets import ProvenSets as ProvenSets
 from .robot_conditions import pose_conditions as pose_conditions
 from .robot_conditions import static_case as static_case
 from .servo_stability import KINDS as KINDS

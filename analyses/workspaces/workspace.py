@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, TypeAlias
 
@@ -13,7 +14,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.folder import results_folder
-from cdpr_drake.analyses.frame.follow import NOBODY, Count, Follow, Progress
+from cdpr_drake.analyses.frame.follow import NOBODY, Follow, Progress
 from cdpr_drake.analyses.frame.jobs import finished_jobs
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import (
@@ -35,12 +36,6 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import whole_file
-from cdpr_drake.analyses.workspaces.box_certificates import (
-    box_search,
-    certified_boxes,
-    refined_boxes,
-    write_boxes,
-)
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
@@ -78,6 +73,9 @@ CHUNKS = {"target-visible": 256, "stable": 256, SURVIVES: 1}
 
 CHUNK = 4096
 """Poses of a chunk with the others: a tenth of a second of work."""
+
+PROOFS = "cdpr_drake.proofs.certified_workspace"
+"""Module that proves boxes of poses, for `certify`."""
 
 
 def corners(word: str) -> Array:
@@ -227,10 +225,9 @@ def compute_workspace(
         velocities=_velocities(velocities), clearance=clearance, pulleys=pulleys, method=method,
         around=interference_bodies(loaded, obstacles, exit_free, anchor_free, pulleys),
     )  # fmt: skip
-    search = None
     if certify:
-        errors = exit_error, anchor_error
-        search = box_search(loaded, about, kinds, poses.angles, errors, region)
+        proofs, errors = import_module(PROOFS), (exit_error, anchor_error)
+        search = proofs.box_search(loaded, about, kinds, poses.angles, errors, region)
     arguments = _arguments(loaded, about, poses, {
         "kinds": kinds, "measures": measures, "orientations": orientations, "method": method,
         "scenario": scenario or "",
@@ -263,29 +260,17 @@ def compute_workspace(
             )  # fmt: skip
             if results is not None:
                 result.save(results)
-        result = replace(result, robot=loaded, hull=cast, bound=ends, search=search, region=region)
-        if search is not None:
-            how = {"on_progress": _counting(follow, boxes), "should_stop": follow.stop}
-            proven, finer = certified_boxes(search, boxes, results, **how), None
-            if refine is not None and proven.finished:
-                how["on_progress"] = _counting(follow, refine_boxes)
-                way = np.asarray(refine, float)
-                proven, finer = refined_boxes(
-                    proven, search, way, refine_reach, refine_boxes, results, **how
-                )
-            result = replace(result, boxes=proven, refined=finer, stopped=not proven.finished)
+        result = replace(result, robot=loaded, hull=cast, bound=ends, region=region)
         if mesh is not None and cast is not None:
             with whole_file(Path(mesh)) as part:
                 write_hull(cast, part)
-        if boxes_mesh is not None and result.boxes is not None:
-            with whole_file(Path(boxes_mesh)) as part:
-                write_boxes(result.boxes, part)
+        if certify:
+            way = None if refine is None else np.asarray(refine, float)
+            result = proofs.certified(
+                result, search, boxes, boxes_mesh and Path(boxes_mesh), way, refine_reach,
+                refine_boxes, results, follow,
+            )  # fmt: skip
         return result.written(results, formats, follow)
-
-
-def _counting(follow: Follow, total: int) -> Callable[[int, float], None]:
-    counter = Count(follow, total, unit="boxes")
-    return lambda judged, share: counter.add(judged - counter.done, f"{share:.1%} open")
 
 
 def _each(words: str | Sequence[str]) -> tuple[str, ...]:

@@ -4,30 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from cdpr_drake.analyses.frame.figures import line_style, new_figure, panels
+from cdpr_drake.analyses.frame.figures import panels
 from cdpr_drake.analyses.workspaces.conditions import ALL, BEST, MEASURES, RULES, SURVIVES, WORST
 from cdpr_drake.analyses.workspaces.plane_panels import (
-    CORNERS,
     draw_planes,
     draw_regions,
     plane_axes,
 )
 from cdpr_drake.arrays import Array
-from cdpr_drake.palette import nth_look
-from cdpr_drake.proofs import box_expansion_kernel
-from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.available_wrenches import AvailableWrenches
 
 if TYPE_CHECKING:
@@ -35,16 +30,6 @@ if TYPE_CHECKING:
 
 OUTSIDE, SOME, INSIDE = "#e8e8e8", "#f0c27b", "#3f8f5f"
 """Of cells where no kind holds, where some do, and where all do."""
-
-PROVEN = {
-    box_expansion_kernel.INSIDE: ("proven inside", INSIDE, None),
-    box_expansion_kernel.OUTSIDE: ("proven outside", OUTSIDE, None),
-    box_expansion_kernel.OPEN: ("open", SOME, "////"),
-}
-"""Label, colour and hatching of boxes by what is proven."""
-
-EDGES: dict[str, Any] = {"edgecolor": "#555555", "linewidth": 0.1}
-"""Of boxes."""
 
 MOST_PLANES = 12
 
@@ -196,62 +181,6 @@ def _draw_break(
             [x], [low + 0.28 * (high - low)], color="black", markerfacecolor="white",
             marker=MARKERS[int(best) - 1], markersize=float(np.clip(0.26 * size, 2, 8)),
         )  # fmt: skip
-
-
-def boxes_figure(boxes: CertifiedBoxes, robot: str, cables: str = "") -> Figure:
-    """Shares that are proven, and what is open, against the number of boxes, with the name of the
-    robot and how its cables run in the title."""
-    words = wrap(f"{robot}: boxes that are proven" + (f"; cables {cables}" if cables else ""), LINE)
-    figure, axes = new_figure(
-        1, 1, (7.0, 4.6), "\n".join(words) + f"\n{boxes.open:.2%} of the box open"
-    )
-    for number, (name, _, _) in enumerate(PROVEN.values()):
-        look, share = nth_look(number), boxes.curve[:, number + 1]
-        shown = share > 0.0  # on a logarithmic axis
-        axes.plot(
-            boxes.curve[shown, 0], 100.0 * share[shown], label=name, **line_style(look),
-            marker=look.marker, markersize=4,
-        )  # fmt: skip
-    axes.set(xscale="log", yscale="log", xlabel="boxes judged", ylabel="share of the box [%]")
-    figure.legend(loc="outside lower center", ncols=3)
-    return figure
-
-
-def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -> Figure:
-    """What is proven in three planes through the middle of the region that was cut.
-
-    Angles that vary are in the middle of their ranges; the title has the robot's name and the kinds
-    that were proven.
-    """
-    lower, upper = boxes.poses - boxes.halves, boxes.poses + boxes.halves
-    low, high = np.min(lower, axis=0), np.max(upper, axis=0)
-    middle = 0.5 * (low + high)
-    wide = [k for k in range(3) if low[k] < high[k]]
-    planes = [k for k in range(3) if len(set(wide) - {k}) == 2] or [2]
-    words = wrap(f"{robot}: poses proven {', '.join(kinds)}", LINE)
-    size = (1.0 + 3.6 * len(planes), 4.8)
-    figure, grid = panels(len(planes), len(planes), size, "\n".join(words))
-    # A pose of a border is in several boxes: a little off the middle, where no cut is.
-    at = middle + 1e-6 * (high - low)
-    for axes, normal in zip(grid, planes, strict=True):
-        u, v = (k for k in range(3) if k != normal)
-        others = [k for k in range(boxes.poses.shape[1]) if k not in (u, v)]
-        hit = np.all(np.abs(boxes.poses - at)[:, others] <= boxes.halves[:, others] + 1e-12, axis=1)
-        for verdict, (_, color, hatch) in PROVEN.items():
-            numbers = np.flatnonzero(hit & (boxes.verdicts == verdict))
-            sizes = 2.0 * boxes.halves[numbers][:, np.newaxis, (u, v)]
-            cells = lower[numbers][:, np.newaxis, (u, v)] + sizes * CORNERS[:4]
-            axes.add_collection(PolyCollection(cells, facecolor=color, hatch=hatch, **EDGES))
-        axes.set(xlim=(low[u], high[u]), ylim=(low[v], high[v]), aspect="equal")
-        axes.set(xlabel=f"{'xyz'[u]} [m]", ylabel=f"{'xyz'[v]} [m]")
-        axes.grid(False)
-        axes.set_title(f"{'xyz'[normal]} = {middle[normal]:.3g} m", fontsize=11)
-    handles = [
-        Patch(facecolor=color, edgecolor="#555555", hatch=hatch, label=label)
-        for label, color, hatch in PROVEN.values()
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    return figure
 
 
 def _contours(axes: Axes, along: list[Array], plane: Array, limits: tuple[float, float]) -> None:

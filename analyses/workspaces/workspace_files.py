@@ -18,7 +18,6 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Pose
-from cdpr_drake.proofs.moving_robots import MovingRobot, PlannedMotion
 from cdpr_drake.schema.declarations import In, Scope, Switch, Text, filled, settings, values
 from cdpr_drake.schema.typed_yaml import load_typed
 from cdpr_drake.systems.worlds.settings import ObstacleMotion, body_motion, way_back_refusals
@@ -27,6 +26,7 @@ from cdpr_drake.trajectories.sampled_motion import read_motion, sampled_motion
 from cdpr_drake.workspaces.cable_distance_kernel import BOX_COLUMNS
 from cdpr_drake.workspaces.cable_interference import Obstacles, box_row
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
+from cdpr_drake.workspaces.moving_robots import MovingRobot, PlannedMotion
 from cdpr_drake.workspaces.moving_shapes import MovingObstacle, MovingShape
 
 MOTION = "How it moves, as a body of a scenario's world does; null: it rests."

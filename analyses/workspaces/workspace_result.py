@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,12 +15,6 @@ from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.frame.result import Table
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.workspaces.box_certificates import (
-    BoxSearch,
-    agreement_numbers,
-    box_numbers,
-    save_boxes,
-)
 from cdpr_drake.analyses.workspaces.conditions import (
     ALL,
     BEST,
@@ -45,8 +39,6 @@ from cdpr_drake.analyses.workspaces.workspace_hulls import (
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.proofs.box_grid_agreement import BoxAgreement, grid_agreement, hull_agreement
-from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.volume import VolumeRule, WorkspaceVolume, workspace_volume
 
@@ -55,49 +47,30 @@ if TYPE_CHECKING:
 
     from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 
-CONTRADICTION = 1
-"""Exit code if a proof contradicts the grid or the hull."""
-
 BOUNDS = {
     "frame": ("the frame", "there"), "box": ("a box", "there"),
     "nothing": ("nothing", "at ten times the frame"),
 }  # fmt: skip
 """What bounds a hull, and where its rays end at the latest, in words."""
 
-COMPARED = {"grid": "poses of the grid", "hull": "ends of the hull's rays"}
-"""What boxes are compared with, in words."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Workspace(GridResult):
-    """Where kinds hold on a grid, and measures there; with hull and boxes if they are computed.
+    """Where kinds hold on a grid, and measures there; with a hull if it is computed.
 
     Attributes:
         holds: By kind, shape (k, nx, ny, nz).
         values: By measure, same shape, in its unit.
         hull: Its hull.
         bound: Where the rays of the hull end at the latest.
-        boxes: Boxes proven inside or outside.
-        search: What was cut into boxes.
         region: Lower and upper corner of the box given instead of the frame, shape (3,) each [m].
-        refined: How boxes were cut further along a way, as `refined_boxes` says.
     """
 
     holds: dict[str, np.ndarray]
     values: dict[str, np.ndarray]
     hull: WorkspaceHull | None = None
     bound: HullBound | None = None
-    boxes: CertifiedBoxes | None = None
-    search: BoxSearch | None = None
     region: tuple[Array, Array] | None = None
-    refined: dict[str, Any] | None = None
-
-    @property
-    def exit_code(self) -> int:
-        """1 if a proof contradicts the grid or the hull, 130 if the call was stopped."""
-        if any(len(part.broken) for part in self.agreement.values()):
-            return CONTRADICTION
-        return super().exit_code
 
     def inside(self, kind: str = ALL) -> np.ndarray:
         """Which poses belong to a kind, or to all of them, shape (k, nx, ny, nz)."""
@@ -132,22 +105,8 @@ class Workspace(GridResult):
             f"({x:.6g}, {y:.6g}, {z:.6g}), {tilt:.4g} deg off -z"
         )
 
-    @cached_property
-    def agreement(self) -> dict[str, BoxAgreement]:
-        """What boxes say of every pose of the grid, and of the ends of a hull's rays.
-
-        A pose that is no part of the workspace contradicts a box proven inside around it, and one
-        of the workspace contradicts a box proven outside.
-        """
-        if self.boxes is None:
-            return {}
-        parts = {"grid": grid_agreement(self.boxes, self.grid, self.inside())}
-        if self.hull is not None and len(self.grid.angles) == 1:
-            parts["hull"] = hull_agreement(self.boxes, self.hull, self.grid.angles[0])
-        return parts
-
     def as_dict(self) -> dict[str, Any]:
-        """Arguments, axes, versions, shares, volumes, ranges of measures, hull and boxes."""
+        """Arguments, axes, versions, shares, volumes, ranges of measures, and the hull."""
         result: dict[str, Any] = {
             **self.arguments, "axes": self.axes_words(), "versions": self.versions,
             "workspaces": {name: self._numbers(name) for name in self._regions()},
@@ -157,13 +116,6 @@ class Workspace(GridResult):
             result["broken"] = self._broken()
         if self.hull is not None and self.bound is not None:
             result["hull"] = hull_numbers(self.hull, self.bound)
-        if self.boxes is not None and self.search is not None:
-            result["certified"] = box_numbers(self.boxes, self.search)
-            if self.refined is not None:
-                result["refined"] = self.refined
-            result["agreement"] = {
-                name: agreement_numbers(part) for name, part in self.agreement.items()
-            }
         return result
 
     def _regions(self) -> list[str]:
@@ -233,7 +185,7 @@ class Workspace(GridResult):
         return [Table(title, heads, rows), *(measured if ranges else [])]
 
     def lines(self) -> list[str]:
-        """The grid, worst cables, hull, boxes, contradictions, and where results are."""
+        """The grid, worst cables, hull, and where results are."""
         lines = [grid_words(self.grid, self.robot, self.arguments["orientations"])]
         if self.is_tilted():
             lines.append(f"axes: {self.axes_words()}")
@@ -243,8 +195,7 @@ class Workspace(GridResult):
                 counted = broken[f"{words.replace(' ', '_')}s"].items()
                 often = ", ".join(f"{name} at {n}" for name, n in counted)
                 lines.append(f"{words} of the poses: {often or 'none'}")
-        lines += [*self._hull_lines(), *self._box_lines()]
-        return [*lines, *self.last_lines()]
+        return [*lines, *self._hull_lines(), *self.last_lines()]
 
     def _hull_lines(self) -> list[str]:
         if self.hull is None or self.bound is None:
@@ -257,29 +208,8 @@ class Workspace(GridResult):
             f"them were cut {ends}"
         ]
 
-    def _box_lines(self) -> list[str]:
-        if self.boxes is None or self.search is None:
-            return []
-        about = box_numbers(self.boxes, self.search)
-        lines = [
-            f"certified, cables {about['cables']}: all poses in {about['inside_share']:.2%} of the "
-            f"box inside, in {about['outside_share']:.2%} outside, {about['open_share']:.2%} open; "
-            f"{about['boxes_judged']} boxes"
-        ]
-        if (finer := self.refined) is not None:
-            lines.append(
-                f"boxes within {finer['reach_m']:g} m of the way: "
-                f"{finer['open_share_before']:.2%} of them were open, "
-                f"{finer['open_share_after']:.2%} are; {finer['boxes_judged']} boxes"
-            )
-        return lines + [
-            f"boxes against {COMPARED[name]}: {len(part.broken)} contradictions at {part.poses} of "
-            f"them; {part.inside} in boxes proven inside, {part.outside} outside"
-            for name, part in self.agreement.items()
-        ]
-
     def notes(self) -> list[str]:
-        """What may be taken for something else, and proofs that are wrong."""
+        """What may be taken for something else."""
         notes = []
         if self.robot is not None and self.robot.frame.assumed and self.region is None:
             notes.append(
@@ -292,15 +222,10 @@ class Workspace(GridResult):
                 f"note: {endless} rays of the hull do not end: volume and area are those of what "
                 "lies within ten times the frame; use box to end them"
             )
-        return notes + [
-            f"error: proven boxes contradict {len(part.broken)} of {part.poses} {COMPARED[name]}, "
-            f"first at ({', '.join(f'{x:g}' for x in part.broken[0])}) [m, rad]: proof or kernel "
-            "is wrong; do not use these results, and report them"
-            for name, part in self.agreement.items() if len(part.broken)
-        ]  # fmt: skip
+        return notes
 
     def figures(self) -> dict[str, Callable[[], Figure]]:
-        """Planes of the grid by what holds and by each measure, breaks, and boxes."""
+        """Planes of the grid by what holds and by each measure, and breaks."""
         from cdpr_drake.analyses.workspaces import workspace_figures as draw
 
         figures: dict[str, Callable[[], Figure]] = {
@@ -309,10 +234,6 @@ class Workspace(GridResult):
         }  # fmt: skip
         if SURVIVES in self.holds:
             figures["breaks"] = partial(draw.breaks_figure, self)
-        if self.boxes is not None:
-            name, kinds = self.arguments["robot"], list(self.arguments["kinds"])
-            figures["open_share"] = partial(draw.boxes_figure, self.boxes, name, self.geometry)
-            figures["boxes"] = partial(draw.box_planes_figure, self.boxes, name, kinds)
         return figures
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -326,11 +247,9 @@ class Workspace(GridResult):
         return kinds | {f"measure/{name}": part for name, part in self.values.items()}
 
     def write(self, folder: Folder, formats: Sequence[str], follow: Follow) -> dict[str, str]:
-        """Writes hull and boxes, too."""
+        """Writes the hull, too."""
         if self.hull is not None:
             save_hull(self.hull, folder)
-        if self.boxes is not None:
-            save_boxes(self.boxes, folder)
         return super().write(folder, formats, follow)
 
     def page(self, robot: Robot) -> tuple[Pictures, str]:

@@ -1,8 +1,8 @@
 """Workspaces in the robot's scene, as a page for the browser that needs no server.
 
-Every workspace, the hull, and boxes by what is proven of them are entries below "workspaces" in
-the page's menu, where they can be shown and hidden. The robot is at home, with tensions that hold
-it under the limits, mass and wrench of the workspace; if none do, its cables are grey.
+Every workspace, the hull, and further solids are entries below "workspaces" in the page's menu,
+where they can be shown and hidden. The robot is at home, with tensions that hold it under the
+limits, mass and wrench of the workspace; if none do, its cables are grey.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import WORKSPACES, Look, rgb
-from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
-from cdpr_drake.proofs.certified_boxes import CertifiedBoxes
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.workspaces.hull import WorkspaceHull
 from cdpr_drake.workspaces.volume import surface_quads, triangles
@@ -46,16 +44,6 @@ COLORS = (
 
 HULL_COLOR = Rgba(0.48, 0.65, 0.85, 0.45)
 
-MOST_BOXES = 3000
-"""So many boxes of each verdict are drawn, the largest."""
-
-VERDICTS = {
-    "inside": (INSIDE, Rgba(0.25, 0.56, 0.37, 0.35)),
-    "outside": (OUTSIDE, Rgba(0.75, 0.35, 0.25, 0.25)),
-    "open": (OPEN, Rgba(0.35, 0.35, 0.35, 0.6)),
-}
-"""Boxes by what is proven of them, and their colours."""
-
 STABILITY_COLORS = {
     "SZ": Rgba(*rgb(WORKSPACES["SZ"]), 0.55),
     "Z": Rgba(*rgb(WORKSPACES["Z"]), 0.45),
@@ -67,16 +55,14 @@ Mesh = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of what is empty."""
 
 
-def workspace_page(workspace: Workspace, robot: Robot) -> tuple[Pictures, str]:
-    """What writes the page of a workspace, and what should be known of it."""
+def workspace_page(
+    workspace: Workspace, robot: Robot, more: Sequence[tuple[str, Mesh, Rgba]] = ()
+) -> tuple[Pictures, str]:
+    """What writes the page of a workspace, and what should be known of it; `more` are solids."""
     solids = workspace_solids(workspace)
     if workspace.hull is not None:
         solids.append(("hull", *hull_solid(workspace.hull)))
-    if workspace.boxes is not None:
-        solids += [
-            (f"boxes/{name}, {words}", mesh, color)
-            for name, words, mesh, color in box_solids(workspace.boxes)
-        ]
+    solids += more
     title = f"{workspace.arguments['robot']}: workspaces, {workspace.geometry}"
     if workspace.is_tilted():
         title = f"axes: {workspace.axes_words()}"
@@ -116,33 +102,6 @@ def stability_solids(stability: Stability) -> list[tuple[str, str, Mesh, Rgba]]:
 def hull_solid(hull: WorkspaceHull) -> tuple[Mesh, Rgba]:
     """A hull and its colour."""
     return (hull.vertices, hull.faces), HULL_COLOR
-
-
-def box_solids(boxes: CertifiedBoxes) -> list[tuple[str, str, Mesh, Rgba]]:
-    """Boxes by what is proven of them: its name, how many, mesh of the largest, colour.
-
-    A verdict without a box is left out.
-    """
-    solids = []
-    for name, (verdict, color) in VERDICTS.items():
-        numbers = np.flatnonzero(boxes.verdicts == verdict)
-        volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[numbers], axis=1)
-        largest = numbers[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
-        if len(largest):
-            words = f"the largest {len(largest)} of {len(numbers)}"
-            mesh = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
-            solids.append((name, words, mesh, color))
-    return solids
-
-
-def _cuboids(middles: Array, halves: Array) -> Mesh:
-    """Vertices, shape (8 k, 3), and triangles, shape (12 k, 3), of boxes."""
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    corners = np.array([(a, b, c) for a, b, c, _ in quads] + [(a, c, d) for a, _, c, d in quads])
-    vertices = (middles[:, np.newaxis] + halves[:, np.newaxis] * signs).reshape(-1, 3)
-    faces = corners + 8 * np.arange(len(middles))[:, np.newaxis, np.newaxis]
-    return vertices, faces.reshape(-1, 3)
 
 
 def _page(

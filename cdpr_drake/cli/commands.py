@@ -102,12 +102,13 @@ COMMANDS = {
         ("cdpr studio acrobot_large", "cdpr studio mine.yaml --port 7100"),
     ),
     "import": Command(
-        _FILES, f"{_VERBS}.exchange:import_files",
+        _FILES, "cdpr_drake.formats.exchange:import_files",
         "Imports a robot from a file of another tool into a folder.",
         ("cdpr import IPAnema_1_bodies.xml", "cdpr import robot.urdf --out mine"),
     ),
     "export": Command(
-        _FILES, f"{_VERBS}.exchange:export_files", "Exports a robot to the format of another tool.",
+        _FILES, "cdpr_drake.formats.exchange:export_files",
+        "Exports a robot to the format of another tool.",
         ("cdpr export caroca --format mjcf", "cdpr export caroca --format sdf --out here"),
     ),
     "schema": Command(
@@ -160,7 +161,7 @@ COMMANDS = {
                 "Plans a motion from one pose to another whose path is free, within limits.",
             ),
             "proven": (
-                f"{_VERBS}.planning.proven_plan:plan_proven_motion",
+                "cdpr_drake.proofs.proven_plan:plan_proven_motion",
                 "Plans a motion from one pose to another in sets of poses that are proven.",
             ),
         },

@@ -1,4 +1,4 @@
-"""The platform's pose from images, from cable lengths, or from both; and what sensors make of it.
+"""Pose of the platform from images or lengths; observers of wrenches, sensors, failures.
 
 Errors of a pose are twists in the body frame, X_true = X exp(e), ordered (rotation, translation).
 

@@ -4,12 +4,13 @@ from .box_refinement import PathTube as PathTube
 from .box_refinement import refine as refine
 from .certified_boxes import PoseBox as PoseBox
 from .certified_boxes import certify as certify
-from .moving_robots import MovingRobot as MovingRobot
-from .moving_robots import PlannedMotion as PlannedMotion
+from .certified_workspace import CertifiedWorkspace as CertifiedWorkspace
+from .certified_workspace import box_search as box_search
 from .no_stable_target import stable_target_exists as stable_target_exists
 from .path_in_sets import proven_motion as proven_motion
 from .path_in_sets import proven_path as proven_path
 from .proven_sets import PoseSets as PoseSets
 from .quadratic_bounds_kernel import Blocks as Blocks
+from .robot_sets import ProvenSets as ProvenSets
 from .timed_motion import motion_in_time as motion_in_time
 from .timed_sets import TimedSets as TimedSets

@@ -1,4 +1,4 @@
-"""What a camera looks at, and how it is found in an image: targets, textures, cables.
+"""What a camera sees: targets, textures, cables; lenses; and how all are found in an image.
 
 Pixels are (u right, v down) from the centre of the first pixel; the camera frame C has z forward,
 x right, y down.

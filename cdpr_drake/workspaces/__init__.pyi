@@ -2,6 +2,8 @@ from .cable_interference import Obstacles as Obstacles
 from .cable_interference import beams as beams
 from .cable_interference import clearances as clearances
 from .demanded_wrenches import SpatialSet as SpatialSet
+from .moving_robots import MovingRobot as MovingRobot
+from .moving_robots import PlannedMotion as PlannedMotion
 from .moving_shapes import MovingShape as MovingShape
 from .pose_grid import grid_by_count as grid_by_count
 from .single_failure import breaks_survived as breaks_survived

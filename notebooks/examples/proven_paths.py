@@ -11,7 +11,7 @@ import numpy as np
 
 import cdpr_drake as cdpr
 from cdpr_drake.analyses.planning.robot_path_task import path_task
-from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
+from cdpr_drake.proofs.robot_sets import ProofSettings, ProvenSets
 from cdpr_drake.workspaces.cable_interference import box_row
 
 ROBOTS = {"caroca": 0.1, "macarm": 1.0, "ipanema_1": 0.5}  # accelerations that are proven [m/s^2]

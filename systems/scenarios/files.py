@@ -12,7 +12,7 @@ import yaml
 
 from cdpr_drake.errors import RobotFileError, ScenarioError, accepted_names
 from cdpr_drake.models.camera_files import resolved_camera
-from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_loader import load_mechanism
 from cdpr_drake.models.robot_loader import MARK as RAILS_MARK

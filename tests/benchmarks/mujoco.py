@@ -14,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.arrays import Array
-from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exchange import export_robot
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot

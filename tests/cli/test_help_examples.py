@@ -37,7 +37,7 @@ LONG_WORK = {
     "plan": [
         "cdpr_drake.analyses.planning.path_plan.plan_along_path",
         "cdpr_drake.analyses.planning.free_plan.solve_free_motion",
-        "cdpr_drake.analyses.planning.proven_plan.ProvenSets.find",
+        "cdpr_drake.proofs.proven_plan.ProvenSets.find",
     ],
     "reconfigure": ["cdpr_drake.analyses.design.reconfiguration.results_folder"],
     "design": ["cdpr_drake.analyses.design.optimization.search_design"],

@@ -8,7 +8,7 @@ from rich.table import Table
 
 from cdpr_drake.cli.terminal import message_console, wide_console
 from cdpr_drake.errors import RobotFileError, plain_words
-from cdpr_drake.models.formats.grab import read_grab
+from cdpr_drake.formats.grab import read_grab
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.systems.scenarios.files import resolve_robot_path
 from tests.cli.commands import refuse, run

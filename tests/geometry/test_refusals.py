@@ -8,7 +8,6 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake import geometry as rays
-from cdpr_drake.analyses.workspaces.proven_sets import ProvenSets
 from cdpr_drake.cables.models import check_model
 from cdpr_drake.errors import (
     CableGeometryError,
@@ -24,6 +23,7 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape, mesh_vertices
 from cdpr_drake.geometry.motion_type import MotionType
 from cdpr_drake.geometry.pose_accuracy import repeatability
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.proofs.robot_sets import ProvenSets
 from tests.geometry.test_cables import BOARD
 from tests.geometry.test_pulleys import ORIGIN, Z, made
 from tests.models.robots import content_of, robot_of

@@ -26,11 +26,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.cables.route_kernel import make_route_room
 from cdpr_drake.dynamics.tree_step_kernel import DONE, TreeMemory, tree_rates
+from cdpr_drake.formats.plant_mjcf import export_plant_mjcf
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_bodies import body_inertias, joint_damping, rotor_inertias, whole_tree
 from cdpr_drake.models.plant_cables import PlantCables
-from cdpr_drake.models.plant_mjcf import export_plant_mjcf
 from cdpr_drake.models.plant_rest import moved
 from cdpr_drake.models.platform_schema import PlatformDamping
 from cdpr_drake.models.robot_in_plant import add_robot

@@ -11,10 +11,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.errors import CableGeometryError, CableModelError, CdprError, TensionProblemError
+from cdpr_drake.formats.plant_mjcf import export_plant_mjcf
 from cdpr_drake.geometry.cable_routes import CableRoute, CableRoutes
 from cdpr_drake.models.plant_bodies import whole_tree
 from cdpr_drake.models.plant_cables import PlantCables
-from cdpr_drake.models.plant_mjcf import export_plant_mjcf
 from cdpr_drake.models.plant_rest import hang, settle
 from cdpr_drake.models.robot_in_plant import add_robot
 from cdpr_drake.models.robot_loader import load_robot

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from cdpr_drake.errors import CdprError, RobotFileError, WorldError
+from cdpr_drake.formats.named_frames import read_named_frames
 from cdpr_drake.models import drake_parsing
-from cdpr_drake.models.formats.named_frames import read_named_frames
 from cdpr_drake.models.mechanism_loader import parse_mechanism
 from cdpr_drake.models.shapes import PlatformShape, mesh_files
 from cdpr_drake.systems.worlds.model_files import mesh_parts, model_parts

@@ -12,10 +12,10 @@ from cdpr_drake.cables.curves import cable_curves
 from cdpr_drake.cables.states import cable_state
 from cdpr_drake.calibration.parameters import CalibrationModel
 from cdpr_drake.errors import CableModelError, CalibrationError, StabilityError
+from cdpr_drake.formats.robot_exports import export_omissions
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_rates import cable_rates_from_base_twist
 from cdpr_drake.geometry.poses import rotation_from_vector
-from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_statics import rigid_platform, tension_problem
 from cdpr_drake.stability.stability_case import StabilityCase

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake import models
+from cdpr_drake import formats, models
+from cdpr_drake.formats import assumptions
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.models.cable_schema import Rail
-from cdpr_drake.models.formats import assumptions
 from cdpr_drake.models.shapes import FrameBeam
 from tests.motion.small_robots import small_robot
 
@@ -32,10 +32,10 @@ def no_home_search(monkeypatch):
 
 def through(robot, format, folder):
     """The robot as it comes back from a format."""
-    for name, text in models.export_robot(robot, format).items():
+    for name, text in formats.export_robot(robot, format).items():
         (folder / name).write_text(text, encoding="utf-8")
         path = folder / name
-    return models.import_robot(folder if format == "caspr" else path).robot
+    return formats.import_robot(folder if format == "caspr" else path).robot
 
 
 @pytest.mark.parametrize(("format", "name"), [(f, n) for f, names in HELD.items() for n in names])
@@ -64,9 +64,9 @@ def test_out_and_in(format, name, tmp_path):
 def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
     """The file says by which rotation; turned back, the robot is the one that was written."""
     robot = small_robot("tilted_gravity")
-    said = models.export_omissions(robot, format)["gravity_direction"]
+    said = formats.export_omissions(robot, format)["gravity_direction"]
     assert said.startswith(f"The world was turned by 19.827 deg: {format} has gravity along -z")
-    texts = models.export_robot(robot, format).values()
+    texts = formats.export_robot(robot, format).values()
     assert all(said.removesuffix(".") in text for text in texts)
     rows = said.partition("R_UW by rows ")[2].removesuffix(".")
     R_UW = np.array(ast.literal_eval(f"[{rows}]"))
@@ -88,7 +88,7 @@ def test_the_world_is_turned_for_formats_with_gravity_along_z(format, tmp_path):
 def test_a_world_with_gravity_along_z_is_not_turned():
     assert all(
         "turned" not in words
-        for words in models.export_omissions(small_robot("tripod"), "caspr").values()
+        for words in formats.export_omissions(small_robot("tripod"), "caspr").values()
     )
     assert models.world_turn(small_robot("tilted_gravity"), "mjcf") == ""
     assert models.gravity_turn(small_robot("tilted_gravity", gravity=0.0)) is None
@@ -126,7 +126,7 @@ def test_mujoco_has_the_same_accelerations(name):
     """Falling, without its cables."""
     mujoco = pytest.importorskip("mujoco")
     robot, velocity = small_robot(name), np.zeros(6)
-    (text,) = models.export_robot(robot, "mjcf").values()
+    (text,) = formats.export_robot(robot, "mjcf").values()
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     model.tendon_stiffness[:] = 0.0

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from pydrake.math import RigidTransform
 
-from cdpr_drake import models
+from cdpr_drake import formats
 from cdpr_drake.analyses.statics.robot_at_rest import static_at_pose
 from cdpr_drake.analyses.workspaces.pose_grid import check_grid
 from cdpr_drake.cli.app import main
@@ -111,13 +111,13 @@ EXPORTS = [
 @pytest.mark.parametrize(("format", "name", "words"), EXPORTS)
 def test_refusal_of_a_format(format, name, words):
     with pytest.raises(RobotFileError, match=words):
-        models.export_robot(small_robot(name), format)
+        formats.export_robot(small_robot(name), format)
 
 
 CALLS = [
     (
         RobotFileError, TURNED,
-        lambda name: models.export_robot(small_robot(name, **OBLIQUE), "caspr"), "upright_body",
+        lambda name: formats.export_robot(small_robot(name, **OBLIQUE), "caspr"), "upright_body",
     ),
     (StabilityError, "its plane y = 0.2", on_grid, "upright_body"),
     (StabilityError, "its line x = 0.3", on_grid, "lift"),
@@ -151,7 +151,7 @@ def test_what_is_near_a_refusal_is_accepted():
     on_grid("tripod")
     assert simulated_cables(small_robot("tripod").cable_set(), "elastic").count == 3
     in_plane = small_robot("upright_body", gravity_direction=[0.1, 0.0, -1.0])
-    assert "PLANAR_XZ" in "".join(models.export_robot(in_plane, "caspr").values())
+    assert "PLANAR_XZ" in "".join(formats.export_robot(in_plane, "caspr").values())
 
 
 @pytest.mark.parametrize(

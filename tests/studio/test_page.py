@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from cdpr_drake.models.robot_exports import export_omissions, omission_words
+from cdpr_drake.formats.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.page import PREFERS_DARK
 from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions

@@ -8,12 +8,6 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.frame.folder import Folder
-from cdpr_drake.analyses.workspaces.box_certificates import (
-    box_search,
-    certified_boxes,
-    load_boxes,
-    save_boxes,
-)
 from cdpr_drake.analyses.workspaces.robot_conditions import interference_bodies, pose_conditions
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.convex_shapes import ConvexShape
@@ -22,6 +16,12 @@ from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.proofs.box_judges import CertifiedKind, CertifyTask, judge_all
 from cdpr_drake.proofs.box_refinement import PathTube, refine
 from cdpr_drake.proofs.certified_boxes import BoxJournal, certify
+from cdpr_drake.proofs.certified_workspace import (
+    box_search,
+    certified_boxes,
+    load_boxes,
+    save_boxes,
+)
 from cdpr_drake.workspaces.cable_interference import Obstacles, Surroundings, box_row, clearances
 from cdpr_drake.workspaces.demanded_wrenches import SpatialSet
 from tests.workspaces.workspace_cases import (

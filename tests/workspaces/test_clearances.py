@@ -16,7 +16,6 @@ from cdpr_drake.geometry.convex_shapes import ConvexShape
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.proofs.moving_clearances import moving_clearances
-from cdpr_drake.proofs.moving_robots import MovingRobot, PlannedMotion
 from cdpr_drake.proofs.timed_cells import PoseRaster, clear_cells
 from cdpr_drake.proofs.timed_ways import earliest_way
 from cdpr_drake.systems.worlds.motions import JointedBody, PathBody, SteadyBody
@@ -34,6 +33,7 @@ from cdpr_drake.workspaces.cable_interference import (
     box_row,
     clearances,
 )
+from cdpr_drake.workspaces.moving_robots import MovingRobot, PlannedMotion
 from cdpr_drake.workspaces.moving_shapes import MovingShape
 from tests.workspaces.workspace_cases import (
     DrakeScene,

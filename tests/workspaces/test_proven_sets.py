@@ -8,7 +8,6 @@ from pydrake.geometry.optimization import LoadIrisRegionsYamlFile, Point
 from pydrake.planning import GcsTrajectoryOptimization
 from scipy import ndimage
 
-from cdpr_drake.analyses.workspaces.proven_sets import ProofSettings, ProvenSets
 from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
 from cdpr_drake.proofs.certified_boxes import CertifiedBoxes, PoseBox
 from cdpr_drake.proofs.cuboid_cover import SumTable, cover_cells, set_groups
@@ -16,6 +15,7 @@ from cdpr_drake.proofs.cuboid_cover_kernel import count_cells, overlapping_pairs
 from cdpr_drake.proofs.proven_cells import CellRegion, ProvenCells, raster_shape, whole_cells
 from cdpr_drake.proofs.proven_connection import separated
 from cdpr_drake.proofs.proven_sets import PoseSets, sets_of_cells
+from cdpr_drake.proofs.robot_sets import ProofSettings, ProvenSets
 from cdpr_drake.workspaces.cable_interference import box_row
 
 FLAT = PoseBox(np.array([-1.0, 0.0, 0.5, 0, 0, 0]), np.array([1.0, 3.0, 0.5, 0, 0, 0]))

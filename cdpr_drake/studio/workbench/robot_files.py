@@ -14,10 +14,10 @@ from typing import Any
 from xml.etree import ElementTree
 
 from cdpr_drake.errors import CdprError, RobotFileError
-from cdpr_drake.models.formats.file_kinds import SUFFIXES as ROBOT_SUFFIXES
-from cdpr_drake.models.formats.file_kinds import is_foreign
-from cdpr_drake.models.robot_exchange import export_robot, import_robot
-from cdpr_drake.models.robot_exports import EXPORTS, export_omissions, omission_words
+from cdpr_drake.formats.robot_exchange import export_robot, import_robot
+from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission_words
+from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.yaml_files import load_yaml
@@ -36,7 +36,7 @@ UPLOADS = tuple(suffix for suffix in ROBOT_SUFFIXES if suffix != ".csv")
 """Endings of files that can be uploaded; lists of models need the folders that they name."""
 
 YAML = "yaml"
-"""The package's own format, beside those of `models.EXPORTS`."""
+"""The package's own format, beside those of `formats.EXPORTS`."""
 
 NAMED_FILES = ("file", "filename", "meshdir", "texturedir", "assetdir", "url")
 """Attributes of XML files that name other files."""
@@ -186,7 +186,7 @@ def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list
     Args:
         robot: The robot.
         text: Its robot file.
-        format: `YAML`, or a name of `models.EXPORTS`.
+        format: `YAML`, or a name of `formats.EXPORTS`.
 
     Raises:
         RobotFileError: The format cannot hold this robot.

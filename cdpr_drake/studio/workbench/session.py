@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_row
-from cdpr_drake.models.formats.file_kinds import is_foreign
+from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.workbench.calculator import Calculator, Signal

@@ -10,14 +10,12 @@ import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 
 from cdpr_drake.analyses.visualization.solids import add_solid
-from cdpr_drake.analyses.workspaces.box_certificates import load_boxes
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
 from cdpr_drake.analyses.workspaces.servo_stability import KINDS
 from cdpr_drake.analyses.workspaces.stability import load_stability
 from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
 from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import (
-    box_solids,
     hull_solid,
     stability_solids,
     workspace_solids,
@@ -25,6 +23,8 @@ from cdpr_drake.analyses.workspaces.workspace_scene import (
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.proofs.box_figures import box_solids
+from cdpr_drake.proofs.certified_workspace import load_boxes
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.workspaces.volume import WorkspaceVolume
 

@@ -271,9 +271,9 @@ import sys
 from importlib import import_module
 from cdpr_drake.cli.commands import COMMANDS
 modules = {command.verb.partition(":")[0] for command in COMMANDS.values()}
-planning = {f"cdpr_drake.analyses.planning.{name}" for name in ("free_plan", "proven_plan")}
+planning = {"cdpr_drake.analyses.planning.free_plan", "cdpr_drake.proofs.proven_plan"}
 for module in sorted(modules | planning):
-    if ".analyses." in module and ".runs." not in module and "campaign" not in module:
+    if ".cli." not in module and ".runs." not in module and "campaign" not in module:
         import_module(module)
         assert "matplotlib" not in sys.modules, module
 """

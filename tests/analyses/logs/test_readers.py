@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from cdpr_drake.analyses.checks import is_log
 from cdpr_drake.analyses.logs.clocks import join_logs
 from cdpr_drake.analyses.logs.dialects import DIALECTS, Dialect, first_line, read_log, recognise
-from cdpr_drake.analyses.logs.import_log import axes_rotation, import_log, with_mapping
+from cdpr_drake.analyses.logs.import_log import axes_rotation, import_log, is_log, with_mapping
 from cdpr_drake.analyses.logs.log import Facts
 from cdpr_drake.analyses.logs.measurements import read_measurements
 from cdpr_drake.analyses.reporting.exported_logs import LOG_WRITERS

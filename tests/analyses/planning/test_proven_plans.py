@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 import yaml
 
-from cdpr_drake.analyses.planning.motions_in_sets import judged
-from cdpr_drake.analyses.planning.proven_plan import plan_proven_motion
 from cdpr_drake.analyses.runs.tension import TensionRun
-from cdpr_drake.analyses.workspaces.proven_sets import (
-    ProofSettings,
-    ProvenSets,
-    accelerated_wrenches,
-)
 from cdpr_drake.errors import PlanningError, WorkspaceError
 from cdpr_drake.geometry.poses import pose_from_angles, rotation_from_angles
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import rigid_platform
+from cdpr_drake.proofs.motions_in_sets import judged
 from cdpr_drake.proofs.moving_clearances import moving_clearances
+from cdpr_drake.proofs.proven_plan import plan_proven_motion
 from cdpr_drake.proofs.proven_sets import PoseSets
+from cdpr_drake.proofs.robot_sets import (
+    ProofSettings,
+    ProvenSets,
+    accelerated_wrenches,
+)
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.workspaces.cable_interference import box_row
 from cdpr_drake.workspaces.demanded_wrenches import spatial_inertias

@@ -15,8 +15,6 @@ import yaml
 from scipy.optimize import linprog
 
 import cdpr_drake as cdpr
-from cdpr_drake.analyses.workspaces import box_certificates
-from cdpr_drake.analyses.workspaces.box_certificates import box_search, certified_boxes
 from cdpr_drake.analyses.workspaces.conditions import conditions_at
 from cdpr_drake.analyses.workspaces.robot_conditions import (
     grid_conditions,
@@ -24,10 +22,12 @@ from cdpr_drake.analyses.workspaces.robot_conditions import (
     static_case,
 )
 from cdpr_drake.analyses.workspaces.workspace_hulls import robot_hull
-from cdpr_drake.models.robot_exchange import import_robot
+from cdpr_drake.formats.robot_exchange import import_robot
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.proofs import certified_workspace
 from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OUTSIDE
 from cdpr_drake.proofs.box_grid_agreement import hull_agreement
+from cdpr_drake.proofs.certified_workspace import box_search, certified_boxes
 from cdpr_drake.workspaces.static_feasibility import statically_feasible
 from tests.cli.commands import STORE_ARRAYS, ended, killed_after
 from tests.cli.conftest import only
@@ -206,8 +206,8 @@ BOXES = (
 """A command whose grid is written twice, then a journal each time that boxes were judged."""
 
 AT_ONCE = """
-from cdpr_drake.analyses.workspaces import box_certificates
-box_certificates.SAVE_SECONDS = 0.0
+from cdpr_drake.proofs import certified_workspace
+certified_workspace.SAVE_SECONDS = 0.0
 """
 
 
@@ -225,8 +225,8 @@ def test_a_killed_search_for_boxes_goes_on_to_the_same_bytes(
     with np.load(f"killed/{name}_journal.npz") as journal:
         judged = len(journal["verdicts"])
     assert not Path("killed/boxes.npz").exists()
-    spy = Mock(wraps=getattr(box_certificates, function))
-    monkeypatch.setattr(box_certificates, function, spy)
+    spy = Mock(wraps=getattr(certified_workspace, function))
+    monkeypatch.setattr(certified_workspace, function, spy)
     with only():
         assert [ended(*BOXES, "--out", folder) for folder in ("killed", "whole")] == [0, 0]
     known = [call.kwargs["known"] for call in spy.call_args_list]

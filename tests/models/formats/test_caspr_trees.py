@@ -9,11 +9,11 @@ from pydrake.multibody.tree import JointIndex
 
 from cdpr_drake import models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats.caspr_mechanism import (
+from cdpr_drake.formats.caspr_mechanism import (
     joint_names,
     link_names,
 )
-from cdpr_drake.models.formats.caspr_trees import (
+from cdpr_drake.formats.caspr_trees import (
     AXIS_KINDS,
     KINDS,
     excess,
@@ -21,7 +21,7 @@ from cdpr_drake.models.formats.caspr_trees import (
     possible_inertia,
     read_tree,
 )
-from cdpr_drake.models.mechanism_exchange import import_mechanism
+from cdpr_drake.formats.mechanism_exchange import import_mechanism
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from tests.models.formats.tree_files import BOX, Cable, Link, Model, at_start, pair, two_link
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from cdpr_drake.models.formats import home_search
-from cdpr_drake.models.formats.home_search import (
+from cdpr_drake.formats import home_search
+from cdpr_drake.formats.home_search import (
     farthest_pose,
     margin_and_multipliers,
     margin_bounds,

@@ -10,9 +10,9 @@ import pytest
 import yaml
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats import caspr, gazebo_yaml, mjcf, named_frames
-from cdpr_drake.models.formats.caspr_trees import read_tree
-from cdpr_drake.models.formats.detection import read_foreign
+from cdpr_drake.formats import caspr, gazebo_yaml, mjcf, named_frames
+from cdpr_drake.formats.caspr_trees import read_tree
+from cdpr_drake.formats.detection import read_foreign
 from tests.models.formats import foreign_files, rich_files
 from tests.models.formats.tree_files import pair, two_link
 

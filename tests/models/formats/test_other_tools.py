@@ -17,9 +17,9 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake import models
 from cdpr_drake.errors import InfeasibleTensionError, RobotFileError
+from cdpr_drake.formats.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exports import export_omissions
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import hold_robot
 from cdpr_drake.models.robot_in_plant import add_robot, find_robot
 from cdpr_drake.models.robot_loader import load_robot

@@ -9,15 +9,15 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.io import savemat
 
 import cdpr_drake as cdpr
-from cdpr_drake import models
+from cdpr_drake import formats, models
 from cdpr_drake.errors import RobotFileError
+from cdpr_drake.formats.caspr import caspr_models, read_caspr
+from cdpr_drake.formats.detection import read_foreign
+from cdpr_drake.formats.grab_mat import is_grab_mat
 from cdpr_drake.geometry.cable_paths import cable_jacobian, cable_paths
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.straight_cables import cable_lengths
-from cdpr_drake.models.formats.caspr import caspr_models, read_caspr
-from cdpr_drake.models.formats.detection import read_foreign
-from cdpr_drake.models.formats.grab_mat import is_grab_mat
-from cdpr_drake.models.formats.reading import read_json
+from cdpr_drake.models.foreign_text import read_json
 from tests.messages import printed
 from tests.models.formats import foreign_files as files
 from tests.models.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, saved, words
@@ -292,7 +292,7 @@ def test_what_is_kept_and_what_is_named(write, changes, kept, said, silent, tmp_
     ],
 )
 def test_joints_of_caspr_are_motion_types(joint, q, position, angles, rows, tmp_path):
-    imported = models.import_robot(files.caspr(tmp_path, joint=joint, q=q))
+    imported = formats.import_robot(files.caspr(tmp_path, joint=joint, q=q))
     robot = imported.robot
     motion = robot.motion_type()
     assert motion.rows == rows
@@ -337,7 +337,7 @@ def test_lists_of_caspr_and_names_of_its_files(tmp_path):
     there = tmp_path / "SCDM" / "Toy_robot"
     assert caspr_models(listed) == {"Toy": (there / "Toy_bodies.xml", there / "Toy_cables.xml")}
     assert read_caspr(listed, "TOY").name == "toy"
-    assert models.import_robot(listed, model="toy").robot.name == "toy"
+    assert formats.import_robot(listed, model="toy").robot.name == "toy"
     assert models.load_robot(str(folder)).name == "toy"
     (folder / "toy_bodies.xml").rename(folder / "toy_body_properties.xml")
     (folder / "toy_cables.xml").rename(folder / "TOY_cable_properties.XML")
@@ -360,7 +360,7 @@ def test_a_passive_spring_is_left_out_by_name(tmp_path):
 def test_an_import_says_what_it_assumed_and_what_it_made_of_limits_and_names(tmp_path):
     path = files.caspr(tmp_path, pulley=True)
     edited(tmp_path, ('name="cable 8"', 'name="cable 1"'))  # as a public model has it
-    imported = models.import_robot(path)
+    imported = formats.import_robot(path)
     assert "cable.youngs_modulus" in imported.completed.assumed
     assert "cables[].exit_point" in imported.completed.given
     assert "cable.youngs_modulus" in imported.readme()
@@ -372,7 +372,7 @@ def test_an_import_says_what_it_assumed_and_what_it_made_of_limits_and_names(tmp
     again = models.load_robot(str(files.saved("robot.yaml", imported.yaml())(tmp_path)))
     np.testing.assert_array_equal(again.cable_set().p_WA, imported.robot.cable_set().p_WA)
     assert again.assumptions == imported.robot.assumptions
-    underactuated = models.import_robot(files.grab(tmp_path))
+    underactuated = formats.import_robot(files.grab(tmp_path))
     assert underactuated.robot.gravity == pytest.approx(9.80665)
     assert any("underactuated" in said for said in underactuated.completed.remarks)
 
@@ -389,7 +389,7 @@ def test_what_mujoco_warns_of_is_said_and_no_file_is_left(tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     files.mjcf(tmp_path)
     edited(tmp_path, ('width="0.002"', 'width="0.002" springlength="0 nan"'))
-    imported = models.import_robot(tmp_path / "toy.xml")
+    imported = formats.import_robot(tmp_path / "toy.xml")
     assert any("NaN" in said for said in imported.completed.remarks)
     assert [path.name for path in tmp_path.iterdir()] == ["toy.xml"]
     assert printed(capfd).err == ""
@@ -411,7 +411,7 @@ def grab_length(A_W, D_P, k_P, r, X_WP):
 
 
 def test_pulleys_on_the_platform_by_the_formula_of_grab(tmp_path):
-    imported = models.import_robot(files.grab_on_board(tmp_path))
+    imported = formats.import_robot(files.grab_on_board(tmp_path))
     cables = imported.robot.cable_set()
     np.testing.assert_allclose(cables.p_WA, EXITS, atol=EXACT)
     np.testing.assert_allclose(cables.p_PB, ANCHORS, atol=EXACT)
@@ -426,7 +426,7 @@ def test_pulleys_on_the_platform_by_the_formula_of_grab(tmp_path):
     assert imported.robot.winch.drum_radius == 0.03
     assert {"cables[].anchor_pulley_radius", "winch.drum_radius"} <= set(imported.completed.given)
     assert "pulley.radius" not in imported.completed.assumed
-    unlike = models.import_robot(files.grab_on_board(tmp_path, drums=(0.06, 0.08)))
+    unlike = formats.import_robot(files.grab_on_board(tmp_path, drums=(0.06, 0.08)))
     assert "winch.drum_radius" in unlike.completed.assumed
 
 
@@ -444,7 +444,7 @@ def patterned(folder, pattern, points):
     cables = [{"pos_OD_glob": A.tolist(), "pos_PA_loc": B.tolist(), "vers_k": [0, 0, 1]}
               for A, B in zip(*points, strict=True)]  # fmt: skip
     content = {"motion_pattern": pattern, "cable": cables, "platform": {"mass": 2.0}}
-    return models.import_robot(files.saved("flat.json", json.dumps(content))(folder))
+    return formats.import_robot(files.saved("flat.json", json.dumps(content))(folder))
 
 
 @pytest.mark.parametrize(

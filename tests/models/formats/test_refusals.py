@@ -2,11 +2,11 @@
 
 import pytest
 
-from cdpr_drake import models
+from cdpr_drake import formats, models
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats.caspr import read_caspr
-from cdpr_drake.models.formats.detection import read_foreign
-from cdpr_drake.models.mechanism_exchange import import_mechanism
+from cdpr_drake.formats.caspr import read_caspr
+from cdpr_drake.formats.detection import read_foreign
+from cdpr_drake.formats.mechanism_exchange import import_mechanism
 from tests.models.formats.foreign_files import (
     ANCHORS,
     EXITS,
@@ -272,7 +272,7 @@ def test_the_loader_refuses_with_the_words_of_the_reader(tmp_path):
     refused(models.load_robot, tmp_path, str(path), "platform.mass: found nan")
 
 
-@pytest.mark.parametrize("read", [models.load_robot, models.import_robot])
+@pytest.mark.parametrize("read", [models.load_robot, formats.import_robot])
 def test_a_mechanism_is_no_robot_with_one_platform(read, tmp_path):
     path = two_link().write(tmp_path)
     refused(read, tmp_path, path, "cdpr import makes a mechanism of it")

@@ -12,9 +12,9 @@ import pytest
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.formats import assumptions
-from cdpr_drake.models.robot_exchange import export_robot
-from cdpr_drake.models.robot_exports import EXPORTS, HELD, export_omissions
+from cdpr_drake.formats import assumptions
+from cdpr_drake.formats.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exports import EXPORTS, HELD, export_omissions, given_fields
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import Text, settings
 from tests.messages import printed
@@ -102,7 +102,7 @@ def test_the_frame_of_gazebo_lies_in_the_middle_of_the_box(name, tmp_path):
 def test_the_robot_with_everything_has_everything():
     """Every key of the schema has a value of its own in one of the robots above."""
     robots = [made(name) for name in UNUSUAL] + [small_robot(name) for name in MOTIONS]
-    given = {key for robot in robots for key in models.given_fields(robot)}
+    given = {key for robot in robots for key in given_fields(robot)}
     only_other_shapes = {f"platform.shape.{key}" for key in ("size", "file")}
     whole = {"cables[].rail", "cables[].material"}  # where they are, their fields are
     keys = {key for robot in robots for key in schema_keys(robot)}
@@ -193,9 +193,9 @@ def test_without_pulleys_nothing_is_said_of_them():
 
 def test_formats_that_cannot_hold_a_robot_say_so():
     with pytest.raises(RobotFileError, match="accepted for sdf: 3R3T"):
-        models.export_robot(made("planar"), "sdf")
+        export_robot(made("planar"), "sdf")
     with pytest.raises(RobotFileError, match="accepted: sdf, sdf-drake"):
-        models.export_robot(made("planar"), "docx")
+        export_robot(made("planar"), "docx")
 
 
 def test_links_of_the_same_name_in_a_model_beside_it_are_not_the_frame(tmp_path):

@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from cdpr_drake.models.formats.caspr_mechanism import initial_joints, write_mechanism
+from cdpr_drake.formats.caspr_mechanism import initial_joints, write_mechanism
 
 BOX = "0.02 0.03 0.04 0.001 -0.002 0.003"
 """Moments and products of a body that can be [kg m^2]."""

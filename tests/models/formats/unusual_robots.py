@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from cdpr_drake.models.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exchange import export_robot
 from cdpr_drake.models.robot_loader import load_robot, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from tests.models.robots import robot_of

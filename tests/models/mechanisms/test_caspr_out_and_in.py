@@ -25,10 +25,10 @@ from pydrake.multibody.tree import (
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.models.caspr_of_plant import links_of_plant
-from cdpr_drake.models.formats.caspr_mechanism import initial_joints, link_names, write_mechanism
-from cdpr_drake.models.formats.caspr_trees import CasprTree
-from cdpr_drake.models.mechanism_exchange import export_mechanism, import_mechanism
+from cdpr_drake.formats.caspr_mechanism import initial_joints, link_names, write_mechanism
+from cdpr_drake.formats.caspr_of_plant import links_of_plant
+from cdpr_drake.formats.caspr_trees import CasprTree
+from cdpr_drake.formats.mechanism_exchange import export_mechanism, import_mechanism
 from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.mechanism_in_plant import add_mechanism
 from tests.messages import printed

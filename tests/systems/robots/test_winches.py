@@ -7,8 +7,8 @@ import pytest
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
+from cdpr_drake.formats.robot_exports import export_omissions
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.models.robot_exports import export_omissions
 from cdpr_drake.models.robot_holding import check_bundles
 from cdpr_drake.models.sensor_catalogue import load_encoder
 from cdpr_drake.systems.robots.cable_robot import automatic_step

@@ -1,0 +1,15 @@
+from .assumptions import complete_draft as complete_draft
+from .draft import RobotDraft as RobotDraft
+from .mechanism_exchange import ImportedMechanism as ImportedMechanism
+from .mechanism_exchange import export_mechanism as export_mechanism
+from .mechanism_exchange import import_mechanism as import_mechanism
+from .plant_mjcf import PlantMjcf as PlantMjcf
+from .plant_mjcf import export_plant_mjcf as export_plant_mjcf
+from .robot_exchange import ImportedRobot as ImportedRobot
+from .robot_exchange import draft_robot as draft_robot
+from .robot_exchange import export_robot as export_robot
+from .robot_exchange import import_robot as import_robot
+from .robot_exports import EXPORTS as EXPORTS
+from .robot_exports import HELD as HELD
+from .robot_exports import export_omissions as export_omissions
+from .robot_exports import given_fields as given_fields
