@@ -23,7 +23,6 @@ from .analyses.runs.run import Run as Run
 from .analyses.runs.scenarios import load_scenario as load_scenario
 from .analyses.runs.seeds import repeat_run as repeat_run
 from .analyses.runs.seeds import run_many as run_many
-from .analyses.runs.serve import serve as serve
 from .analyses.runs.servo import ServoRun as ServoRun
 from .analyses.runs.simulate import finish_run as finish_run
 from .analyses.runs.simulate import simulate as simulate
@@ -59,6 +58,8 @@ from .models.robot_schema import Pose as Pose
 from .models.robot_schema import Robot as Robot
 from .proofs.proven_plan import plan_proven_motion as plan_proven_motion
 from .sections.emergency.reactions import compare_reactions as compare_reactions
+from .sections.remote.client import RemoteClient as RemoteClient
+from .sections.remote.serve import serve as serve
 from .servoing.servo_law import ServoLaw as ServoLaw
 from .servoing.servo_task import BelievedRobot as BelievedRobot
 from .systems.batches.batch_robots import BatchRobots as BatchRobots
@@ -69,7 +70,6 @@ from .systems.diagrams.servo_blocks import add_visual_servo as add_visual_servo
 from .systems.diagrams.tension_control import add_tension_control as add_tension_control
 from .systems.diagrams.visual_servo import build_visual_servo as build_visual_servo
 from .systems.estimators.pose_estimator import Read as Read
-from .systems.remote.remote_client import RemoteClient as RemoteClient
 from .systems.robots.assembly import RobotBlock as RobotBlock
 from .systems.robots.assembly import add_cable_robot as add_cable_robot
 from .systems.robots.assembly import apply_force as apply_force

@@ -1,7 +1,7 @@
 """Drives `cdpr serve acrobot_computed_torque --place controller`; needs pyzmq, and no cdpr_drake.
 
 PD about the desired motion, with weight and desired acceleration of a platform of 3.5 kg fed
-forward. The messages: python -c "import cdpr_drake.systems.remote as b; print(b.__doc__)"
+forward. The messages: python -c "import cdpr_drake.sections.remote as b; print(b.__doc__)"
 """
 
 import json

@@ -29,6 +29,10 @@ SECTIONS = {
     "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
     "robot_scenario.disturbances": "cdpr_drake.sections.disturbances.section:DisturbanceSettings",
+    "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
+    "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
+    "tension_control.force_control": "cdpr_drake.sections.force_control.section:ForceControl",
+    "tension_control.predictive": "cdpr_drake.sections.predictive.section:PredictiveSettings",
 }
 """Module and class of each section, by the place of its key in scenarios: `robot_scenario` is every
 kind but that of mechanisms."""
@@ -73,12 +77,15 @@ class Section:
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
         by_hand: By what can be done by hand to a run that goes on, see `do`: the section's least
             content, as YAML, which lets it be done and changes nothing. Of `robot_scenario` only.
+        outside: True if a process outside closes the loop. The block in whose place it stands
+            has an attribute `outside`, its place, which a run hands to `Follow.connect`.
     """
 
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
     report: ClassVar[str] = ""
     by_hand: ClassVar[Mapping[str, str]] = {}
+    outside: ClassVar[bool] = False
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """What its settings cannot be together, or with robot and scenario; see `Scope`."""
@@ -99,6 +106,31 @@ class Section:
     def needs_plant(self, scenario: Any) -> bool:
         """Whether the engine plant alone can run a scenario that has it."""
         return False
+
+    def tension_blocks(self, settings: Any, robot: Any) -> Mapping[str, Any]:
+        """Makers of blocks of dynamic control in the place of the usual ones.
+
+        Args:
+            settings: The `TensionControlSettings` of a run, with the usual makers.
+            robot: The robot.
+
+        Returns:
+            By the fields `controller` and `distributor` of these settings, which say what makers
+            take and what a block may offer.
+        """
+        return {}
+
+    def tension_loop(self, control: Any) -> Callable[[Any, float], Any] | None:
+        """A loop that steps dynamic control in the place of its diagram.
+
+        Args:
+            control: The `TensionControl` with the blocks that the section has made.
+
+        Returns:
+            Makes the loop of the control and the rate of its log [Hz]: `TensionRows` with a `name`
+            for the summary, `time`, `advance_to`, `pose` and `errors`. None: a diagram.
+        """
+        return None
 
     def add_to(self, builder: Any, blocks: Any, settings: Any) -> Mapping[str, Any]:
         """Adds its blocks to a visual servo.

@@ -49,7 +49,7 @@ class Follow:
         results: Folder below which results are kept that nobody gave a folder; None: none are.
         prepare: Gets a run, Drake's simulator and the diagram before the run starts.
         acts: True if what was prepared may change the run, which then cannot go on after a kill.
-        connect: Brings a process outside to its place in the loop of a run, a `Remote`.
+        connect: Brings a process outside to its place in the loop of a run.
         ended: Gets a run when it has ended, before its files are written.
     """
 

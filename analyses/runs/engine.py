@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from pydrake.systems.analysis import InitializeParams, ResetIntegratorFromFlags, Simulator
@@ -19,7 +19,6 @@ from cdpr_drake.systems.monitoring.run_monitor import Outcome
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.runs.run import Run
-    from cdpr_drake.systems.remote.remote_place import Remote
 
 LONGEST_WARM_UP = 1.0
 """Simulated time at most in which kernels are loaded [s]; a camera of a frame an hour is not waited
@@ -29,14 +28,21 @@ BEYOND = 1e9
 """Metres, radians and their rates that no platform has, but one whose run has diverged."""
 
 
+class Place(Protocol):
+    """The place of a process outside in a loop, which a block offers as its attribute `outside`."""
+
+    def resting(self) -> AbstractContextManager[None]:
+        """Nobody is asked inside the block."""
+
+
 class Engine(ABC):
     """What steps a run.
 
     Attributes:
-        remote: Place of a process outside; None without one.
+        outside: Place of a process outside; None without one.
     """
 
-    remote: Remote | None = None
+    outside: Place | None = None
 
     @abstractmethod
     def start(self, resumed: bool, follow: Follow, run: Run) -> None:
@@ -75,9 +81,9 @@ class Engine(ABC):
         raise ValueError("its state is not arrays")
 
 
-def resting(remote: Remote | None) -> AbstractContextManager[None]:
+def resting(place: Place | None) -> AbstractContextManager[None]:
     """No process outside takes part inside the block."""
-    return nullcontext() if remote is None else remote.resting()
+    return nullcontext() if place is None else place.resting()
 
 
 def fixed_step_simulator(diagram: Any, context: Any, method: str, step: float) -> Simulator:
@@ -101,7 +107,7 @@ class DiagramEngine(Engine):
         """Loads kernels and renderer by a short simulation, then makes the context.
 
         Args:
-            built: Has `diagram`, `make_context`, `log`, and perhaps `remote` and `read_log`.
+            built: Has `diagram`, `make_context`, `log`, and perhaps `outside` and `read_log`.
             method: Drake's integrator.
             step: Its step [s].
             duration: Longest simulated time [s].
@@ -110,9 +116,10 @@ class DiagramEngine(Engine):
             errors: Of the context, see `Engine.errors`.
         """
         self._built, self._method, self._step, self._duration = built, method, step, duration
-        self._outcome, self._errors, self.remote = outcome, errors, getattr(built, "remote", None)
+        self._outcome, self._errors = outcome, errors
+        self.outside = getattr(built, "outside", None)
         self._read = getattr(built, "read_log", built.log.read)
-        with suppress(CableGeometryError, DivergedError, RuntimeError), resting(self.remote):
+        with suppress(CableGeometryError, DivergedError, RuntimeError), resting(self.outside):
             warm = self._simulator(built.make_context())
             warm.AdvanceTo(min(warm_up, duration, LONGEST_WARM_UP))
         self.context = built.make_context()
@@ -166,7 +173,7 @@ class LoopEngine(Engine):
     def __init__(
         self, loop: Any, log: Any, read: Callable[[Any], Log], duration: float,
         outcome: Callable[[], Outcome], errors: Callable[[], tuple[float, float]],
-        remote: Remote | None = None,
+        outside: Place | None = None,
     ) -> None:  # fmt: skip
         """Of a loop.
 
@@ -177,10 +184,10 @@ class LoopEngine(Engine):
             duration: Longest simulated time [s].
             outcome: After each piece.
             errors: See `Engine.errors`.
-            remote: Place of a process outside.
+            outside: Place of a process outside.
         """
         self.loop, self._log, self._read, self._duration = loop, log, read, duration
-        self._outcome, self._errors, self.remote = outcome, errors, remote
+        self._outcome, self._errors, self.outside = outcome, errors, outside
 
     def start(self, resumed: bool, follow: Follow, run: Run) -> None:
         if not resumed and hasattr(self.loop, "start"):

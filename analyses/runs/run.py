@@ -69,7 +69,7 @@ PIECE = 0.1
 """Simulated time between reports of progress and looks at a request to stop [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """A subject of a run: its numbers in the summary, its figures, or both.
 
@@ -226,7 +226,7 @@ class Run(Result):
         parts = None if folder is None else folder / PARTS
         resume = parts is not None and (parts / CHECKPOINT).is_file()
         engine = self.engine(follow, resume)
-        repeatable = engine.remote is None and not follow.acts
+        repeatable = engine.outside is None and not follow.acts
         if not repeatable and parts is not None and parts.is_dir():
             raise OutputFolderError(
                 f"{folder}: found the log of a run with a process outside, which cannot go on; "
@@ -234,8 +234,8 @@ class Run(Result):
             )
         recorder = Recorder(engine, parts, checkpoints=repeatable)
         began = time.perf_counter() - (recorder.earlier or 0.0)
-        if engine.remote is not None and follow.connect is not None:
-            follow.connect(engine.remote)
+        if engine.outside is not None and follow.connect is not None:
+            follow.connect(engine.outside)
         engine.start(recorder.earlier is not None, follow, self)
         self.outcome = Outcome.RUNNING
         try:
@@ -266,15 +266,18 @@ class Run(Result):
 
     def _check_connected(self, follow: Follow) -> None:
         """Refuses a run whose loop nobody closes, or without a place for who should."""
-        place = getattr(self.scenario, "remote", None)  # mechanisms have no such section
-        name = f"{self.scenario.name}: remote: found"
-        if place is not None and follow.connect is None:
+        keys = [key for key, section in sections_of(self.scenario) if section.outside]
+        name = self.scenario.name
+        if keys and follow.connect is None:
             raise ScenarioError(
-                f"{name} a section, so a process outside closes the loop; accepted: cdpr serve, or "
-                "remote: null"
+                f"{name}: {keys[0]}: found a section, so a process outside closes the loop; "
+                f"accepted: cdpr serve, or {keys[0]}: null"
             )
-        if place is None and follow.connect is not None:
-            raise ScenarioError(f"{name} null; accepted: a section with a place")
+        if not keys and follow.connect is not None:
+            raise ScenarioError(
+                f"{name}: found no section that lets a process outside close the loop; accepted: "
+                "one of these"
+            )
 
     def _progress(self, engine: Engine, seconds: float) -> Progress:
         """How far it is, and how far from its goal."""
@@ -365,9 +368,6 @@ class Run(Result):
         for subject in self._applying():
             if subject.key and subject.numbers is not None:
                 summary[subject.key] = subject.numbers(self)
-        remote = getattr(self.built, "remote", None)
-        if remote is not None:
-            summary["remote"] = remote.report()
         cleaned: dict[str, Any] = finite(summary)
         return cleaned
 
@@ -377,7 +377,7 @@ class Run(Result):
             load_object(section.report)
             for _, section in sections_of(self.scenario) if section.report
         )  # fmt: skip
-        subjects = [*self.subjects, *chain.from_iterable(of_sections)]
+        subjects = dict.fromkeys([*self.subjects, *chain.from_iterable(of_sections)])
         return [subject for subject in subjects if subject.applies(self)]
 
     def ending(self) -> dict[str, Any]:

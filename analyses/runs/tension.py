@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,6 @@ from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine, r
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.subjects import (
-    FORCES,
     PROGRAM_STEPS,
     WORLD,
     world_facts,
@@ -44,18 +44,14 @@ from cdpr_drake.geometry.poses import pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import ANGLE, DESIRED, DISTANCE, PLATFORM
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
-from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
 from cdpr_drake.systems.diagrams.tension_control import (
     TensionControl,
     TensionControlSettings,
     build_tension_control,
 )
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
-from cdpr_drake.systems.loops.remote_tension_loop import RemoteTensionLoop, can_be_stepped
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR
 from cdpr_drake.systems.robots.settings import (
-    COMPILED,
     CableSettings,
     model_words,
     simulated_model,
@@ -69,11 +65,11 @@ class TensionRun(Run):
     """A run of dynamic control; it ends COMPLETED, CONTACT, DIVERGED, CLIENT_ENDED or INTERRUPTED.
 
     Attributes:
-        loop: What stepped it: compiled, diagram, or remote; None if only the log is left.
+        loop: What stepped it: diagram, compiled, or a section's loop; None if only the log is left.
     """
 
     kind = TENSION_CONTROL
-    subjects = (FORCES, PROGRAM_STEPS, WORLD)
+    subjects = (PROGRAM_STEPS, WORLD)
     loop: str | None = None
 
     @cached_property
@@ -84,13 +80,8 @@ class TensionRun(Run):
         believed = robot if belief is None else load_robot(belief)
         damping = scenario.damping.of(robot) if belief is None else None
         dynamics = platform_dynamics(believed, damping=damping)
-        trajectory = scenario.trajectory.trajectory()
-        distributor: Any = TensionControlSettings.distributor
-        if scenario.predictive is not None:
-            ahead, view = scenario.predictive.steps, scenario.predictive.view(robot)
-            distributor = PredictiveTensions(trajectory, ahead, view, dynamics)
         settings = TensionControlSettings(
-            trajectory=trajectory,
+            trajectory=scenario.trajectory.trajectory(),
             gains=scenario.controller.gains(),
             method=scenario.distribution.method,
             limits=scenario.limits(),
@@ -101,15 +92,14 @@ class TensionRun(Run):
             dynamics=dynamics,
             balance=scenario.controller.balance,
             rule=scenario.step_rule(),
-            remote=None if scenario.remote is None else scenario.remote.place,
-            distributor=distributor,
             world=scenario.world,
             stop_at_contact=scenario.stop.contact,
-            force=scenario.force_control,
             sections=[section for _, section in sections_of(scenario)],
             seed=scenario.seed,
             damping=scenario.damping,
         )
+        for _, section in sections_of(scenario):
+            settings = replace(settings, **section.tension_blocks(settings, robot))
         return build_tension_control(robot, settings, log_rate=scenario.log_rate)
 
     def check(self) -> list[str]:
@@ -128,8 +118,8 @@ class TensionRun(Run):
     def engine(self, follow: Follow, resume: bool) -> Engine:
         scenario, built, rule = self.scenario, self.built, self.scenario.integration
         looks = follow.prepare is not None or resume
-        if not looks and (can_be_compiled(built) or can_be_stepped(built)):
-            return self._loop_engine()
+        if not looks and (make := self._loop_maker()) is not None:
+            return self._loop_engine(make)
         self.loop = DIAGRAM
         engine = DiagramEngine(
             built, rule.integrator, rule.max_step, scenario.duration,
@@ -140,18 +130,24 @@ class TensionRun(Run):
         self._count_anew()
         return engine
 
-    def _loop_engine(self) -> LoopEngine:
-        """A loop without a diagram; with a process outside, compiled steps between its answers."""
+    def _loop_maker(self) -> Callable[[TensionControl, float], Any] | None:
+        """What makes a loop without a diagram; None: it needs one."""
+        if can_be_compiled(self.built):
+            return TensionLoop
+        makers = (section.tension_loop(self.built) for _, section in sections_of(self.scenario))
+        return next((make for make in makers if make is not None), None)
+
+    def _loop_engine(self, make: Callable[[TensionControl, float], Any]) -> LoopEngine:
+        """A loop without a diagram."""
         scenario, built = self.scenario, self.built
-        make = TensionLoop if built.remote is None else RemoteTensionLoop
-        self.loop = COMPILED if built.remote is None else "remote"
-        with suppress(CableGeometryError, DivergedError), resting(built.remote):  # loads kernels
+        with suppress(CableGeometryError, DivergedError), resting(built.outside):  # loads kernels
             make(built, scenario.log_rate).advance_to(1.0 / scenario.controller.rate)
         self._count_anew()
         loop = make(built, scenario.log_rate)
+        self.loop = loop.name
         outcome = lambda: self._outcome(loop.pose(), loop.time)  # noqa: E731
         return LoopEngine(
-            loop, loop, loop.read_log, scenario.duration, outcome, loop.errors, built.remote
+            loop, loop, loop.read_log, scenario.duration, outcome, loop.errors, built.outside
         )
 
     def _count_anew(self) -> None:
@@ -189,7 +185,7 @@ class TensionRun(Run):
             "kind": scenario.kind,
             "robot": self.robot.name,
             "geometry": self.geometry,
-            "controller": "computed_torque" if scenario.predictive is None else "predictive",
+            "controller": "computed_torque",
             "method": scenario.distribution.method,
             "seed": scenario.seed,
             **self.ending(),
@@ -214,7 +210,7 @@ class TensionRun(Run):
     def facts(self, summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         position, rotation = summary["position_error_m"], summary["rotation_error_rad"]
         tension, error = summary["tension_n"], f"{1e3 * position['max']:.4f} mm"
-        span, method = "none yet", "the client" if self._has_client() else summary["method"]
+        span, method = "none yet", f"the {self._source}" if self._source else summary["method"]
         if tension["min"] is not None:
             span = f"{tension['min']:.2f} to {tension['max']:.2f} N"
         return [
@@ -225,9 +221,10 @@ class TensionRun(Run):
             *world_facts(summary),
         ]
 
-    def _has_client(self) -> bool:
-        """True if a process outside distributes tensions."""
-        return self.built.remote is not None and self.built.remote.place == DISTRIBUTOR
+    @property
+    def _source(self) -> str:
+        """Who distributes tensions in the place of the method; empty: nobody."""
+        return self.built.blocks.distributor.source
 
     @property
     def geometry(self) -> str:
@@ -238,8 +235,7 @@ class TensionRun(Run):
 
     def subtitle(self) -> str:
         method = self.scenario.distribution.method.replace("_", " ")
-        source = "client" if self._has_client() else method
-        return f"tensions by the {source}, {self.geometry}"
+        return f"tensions by the {self._source or method}, {self.geometry}"
 
     def main_figures(self) -> dict[str, Callable[[], Figure]]:
         return {

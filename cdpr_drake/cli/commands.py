@@ -56,7 +56,7 @@ COMMANDS = {
         ("cdpr finish runs/acrobot_pbvs", "cdpr finish runs/acrobot_pbvs --video"),
     ),
     "serve": Command(
-        _RUN, f"{_VERBS}.runs.serve:serve",
+        _RUN, "cdpr_drake.sections.remote.serve:serve",
         "Runs a scenario with an external process in its loop, over ZeroMQ.",
         ("cdpr serve acrobot_pbvs", "cdpr serve acrobot_pbvs --port 5599 --duration 5"),
     ),

@@ -9,6 +9,10 @@ from .emergency.break_detector import BreakDetector as BreakDetector
 from .emergency.failure_monitor import FailureMonitor as FailureMonitor
 from .emergency.reaction import EmergencyReaction as EmergencyReaction
 from .emergency.section import EmergencySettings as EmergencySettings
+from .force_control.section import ForceControl as ForceControl
+from .force_control.section import ForceTracking as ForceTracking
+from .predictive.section import PredictiveDistributor as PredictiveDistributor
+from .predictive.section import PredictiveSettings as PredictiveSettings
 from .stability.section import StabilitySettings as StabilitySettings
 from .stability.section import StabilityWatch as StabilityWatch
 from .wrench_estimation.section import WrenchEstimation as WrenchEstimation

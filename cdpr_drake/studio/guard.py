@@ -17,8 +17,8 @@ from html import escape
 from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
+from cdpr_drake.hosts import is_loopback
 from cdpr_drake.studio.entrance import Entrance
-from cdpr_drake.systems.remote.server_socket import is_loopback
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Any]]

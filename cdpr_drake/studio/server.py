@@ -14,6 +14,7 @@ from nicegui import app, background_tasks, ui
 from nicegui.server import Server
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.entrance import Entrance, is_token, token_words
@@ -26,7 +27,6 @@ from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.systems.remote.server_socket import is_loopback
 
 LOOPBACK = "127.0.0.1"
 USUAL_PORT = 8642

@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 
-from cdpr_drake.systems.remote import RemoteClient
+from cdpr_drake.sections.remote import RemoteClient
 
 SERVER = [
     sys.executable, "-m", "cdpr_drake", "serve", "acrobot_computed_torque", "--place", "controller",

@@ -5,6 +5,7 @@ Source: see `control.task_space.computed_torque`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from pydrake.common.value import AbstractValue, Value
@@ -74,7 +75,10 @@ class PoseTracking(LeafSystem):
 
     Attributes:
         dynamics: What the controller believes of the platform.
+        logged: Names of further outputs that a run logs.
     """
+
+    logged: Sequence[str] = ()
 
     def __init__(
         self,

@@ -40,7 +40,12 @@ class TensionDistributor(LeafSystem):
 
     A method made by `TensionMethod.from_program` is built for this robot here, once, and starts at
     the tensions of the last step; `step_times` tells what it costs.
+
+    Attributes:
+        source: Whose tensions they are, in a word; empty: the method's.
     """
+
+    source = ""
 
     def __init__(
         self,

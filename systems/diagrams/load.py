@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.control.force_balance import FORCE, WRENCH, force_problem
+from cdpr_drake.control.force_balance import FORCE, force_problem
 from cdpr_drake.errors import (
     CableGeometryError,
     RobotFileError,
@@ -31,8 +30,6 @@ from cdpr_drake.systems.diagrams.mechanism_control import (
     mechanism_refusals,
 )
 from cdpr_drake.systems.diagrams.scenario_checks import SERVO_REFUSALS
-from cdpr_drake.systems.remote.remote_place import TENSION_PLACES
-from cdpr_drake.systems.remote.settings import place_refusals
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import (
     MECHANISM,
@@ -83,25 +80,11 @@ def read_inputs(scenario: Scenario) -> None:
 
 
 def _control_refusals(scope: Scope) -> Iterator[Refusal]:
-    """What of a scenario of dynamic control does not go together."""
-    scenario, robot = scope.whole, scope.robot
-    yield from place_refusals(scenario.remote, TENSION_PLACES)
+    """Robots that dynamic control is not for."""
+    robot = scope.robot
     if robot.winch_groups().are_shared():
         found = f"{robot.name} with several cables on one winch, which cannot be given tensions"
         yield "robot", f"{found} one by one", "a robot with a winch for each cable"
-    beside = {
-        "perturbations.believed_robot": scenario.perturbations.believed_robot,
-        "force_control": scenario.force_control,
-    }
-    for key, other in product(beside, ("remote", "predictive")):
-        if beside[key] is not None and getattr(scenario, other) is not None:
-            yield key, f"beside {other}", "one of both"
-    if scenario.force_control is not None and scenario.integration.engine == COMPILED:
-        yield "integration.engine", f"{COMPILED} beside force_control", "plant"
-    for key in ("predictive", "force_control"):
-        if getattr(scenario, key) is not None and scenario.controller.balance != WRENCH:
-            found = f"{scenario.controller.balance} beside {key}"
-            yield "controller.balance", found, WRENCH
 
 
 def _engine_refusals(scope: Scope) -> Iterator[Refusal]:

@@ -30,7 +30,6 @@ from cdpr_drake.systems.diagrams.torque_control import (
     winch_group_refusals,
 )
 from cdpr_drake.systems.estimators.estimator_kinds import ESTIMATORS
-from cdpr_drake.systems.remote.settings import servo_place_refusals
 from cdpr_drake.systems.robots.cable_forces import simulated_cables
 from cdpr_drake.systems.robots.cable_robot import SEMI_IMPLICIT
 from cdpr_drake.systems.robots.settings import COMPILED
@@ -265,7 +264,6 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     torque_refusals,
     plan_refusals,
     _integration,
-    servo_place_refusals,
     _world,
 )
 """Every check of a scenario against its robot, in order."""

@@ -28,7 +28,6 @@ from cdpr_drake.systems.diagrams.torque_control import (
     connect_torque_controller,
 )
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings, EstimatorTask
-from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
@@ -169,8 +168,8 @@ def add_visual_servo(
     for port, source in sight.items():
         builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
-    if isinstance(servo, RemoteServo):
-        for port in ("tensions", "lengths"):
+    for port in ("tensions", "lengths"):
+        if servo.HasInputPort(port):
             builder.Connect(robot.GetOutputPort(port), servo.GetInputPort(port))
     corrector, velocities = add_tension_corrector(
         builder, settings, robot, believed=model.believed, readings=readings, servo=servo,

@@ -23,7 +23,6 @@ from cdpr_drake.systems.diagrams.beliefs import (
 from cdpr_drake.systems.diagrams.controller import controller_of, make_controller
 from cdpr_drake.systems.diagrams.fusion_models import fusion_task
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorTask
-from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
 from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.trajectories.pose_trajectory import MovingPose, PoseTrajectory
@@ -97,21 +96,16 @@ class ServoModel:
         """The block of the law, or of a plan."""
         controller, target, pinhole = self.controller, self.target, self.pinhole
         rate = settings.controller.rate
-        if settings.remote is not None:
-            return RemoteServo(
-                controller, target, pinhole, rate,
-                robot=self.robot, place=settings.remote.place, X_CdO=self.X_CdO,
-            )  # fmt: skip
+        for _, section in sections_of(settings):
+            servo: FeatureServo | None = section.make_servo(self, settings)
+            if servo is not None:
+                return servo
         if self.plan is not None:
             return OpenLoopServo(controller, target, pinhole, rate, self.plan)
         if settings.pose_plan is not None:
             goals = [task.desired.transform() for task in settings.tasks()]
             way = settings.pose_plan.plan()
             return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
-        for _, section in sections_of(settings):
-            servo: FeatureServo | None = section.make_servo(self, settings)
-            if servo is not None:
-                return servo
         return FeatureServo(controller, target, pinhole, rate)
 
     def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -23,11 +24,8 @@ from cdpr_drake.models.robot_in_plant import RobotInPlant, add_robot, pose_on_jo
 from cdpr_drake.models.robot_loader import as_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
-from cdpr_drake.systems.controllers.force_tracking import ForceControl, ForceTracking
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.monitoring.log_row import RunLog, add_log
-from cdpr_drake.systems.remote.remote_place import DISTRIBUTOR, TRAJECTORY, Remote
-from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
 from cdpr_drake.systems.robots.assembly import add_hysteresis, apply_force
 from cdpr_drake.systems.robots.compiled_cable_robot import motion_by_tensions
 from cdpr_drake.systems.robots.compiled_motion import HELD, MEMORY, CompiledMotion
@@ -99,12 +97,11 @@ class TensionControl:
         return self.diagram.GetOutputPort("X_WP").Eval(context)
 
     @property
-    def remote(self) -> Remote | None:
-        """Where a process outside stands; None: nowhere."""
-        for block in (self.blocks.controller, self.blocks.distributor):
-            if isinstance(block, RemoteTracking | RemoteDistributor):
-                return block.remote
-        return None
+    def outside(self) -> Any:
+        """The place of a process outside, as a block offers it; None: there is none."""
+        blocks = self.blocks.controller, self.blocks.distributor
+        places = (getattr(block, "outside", None) for block in blocks)
+        return next((place for place in places if place is not None), None)
 
     def read_log(self, context: Context) -> dict[str, Array]:
         """What was logged, from a root context.
@@ -179,13 +176,15 @@ class TensionControlSettings:
         believed_cables: What the distributor believes of them; None: as they are.
         dynamics: What the controller believes of the platform; None: as it is.
         balance: What tensions balance, a name of `force_balance.BALANCES`.
-        distributor: Makes the block that distributes, from the arguments of `TensionDistributor`.
+        controller: Makes the block that follows the trajectory, from the arguments of
+            `PoseTracking`.
+        distributor: Makes the block that distributes, from those of `TensionDistributor`. Either
+            may have an input port tensions or lengths, vector(m) [N, m], which gets those of the
+            cables, and an attribute `outside`, see `Section.outside`.
         rule: How the robot is integrated in compiled steps; None: a plant moves it, by the
             simulator's integrator.
-        remote: In which of `remote_place.TENSION_PLACES` a process outside stands; None: nowhere.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
-        force: How the platform answers forces; None: as computed torque does. Needs the plant.
         sections: Sections of a scenario, of which some push the platform. These need the plant.
         seed: Of their random numbers.
         damping: Of the simulated platform; by default the robot file's. It is in the dynamics that
@@ -203,12 +202,11 @@ class TensionControlSettings:
     believed_cables: CableSet | None = None
     dynamics: PlatformDynamics | None = None
     balance: str = WRENCH
+    controller: Callable[..., PoseTracking] = PoseTracking
     distributor: Callable[..., TensionDistributor] = TensionDistributor
     rule: StepRule | None = None
-    remote: str | None = None
     world: WorldSettings | None = None
     stop_at_contact: bool = False
-    force: ForceControl | None = None
     sections: Sequence[Section] = ()
     seed: int = 0
     damping: DampingSettings = field(default_factory=DampingSettings)
@@ -265,7 +263,17 @@ def add_tension_control(
     if real is None:
         real = in_plant.robot.cable_set().without_pulleys()
     believed = real if settings.believed_cables is None else settings.believed_cables
-    control, distribution = _deciders(in_plant, settings, believed)
+    balance = settings.balance
+    dynamics = settings.dynamics or platform_dynamics(
+        in_plant.robot, balance, damping=settings.damping.of(in_plant.robot)
+    )
+    control = settings.controller(
+        in_plant, settings.trajectory, settings.gains, dynamics, balance=balance
+    )
+    distribution = settings.distributor(
+        in_plant, settings.method, settings.limits, settings.rate, settings.reference, believed,
+        balance=balance,
+    )  # fmt: skip
     driven: TensionDrivenCables | CompiledMotion
     systems: dict[str, LeafSystem] = {"controller": control, "distributor": distribution}
     if settings.rule is None:
@@ -291,11 +299,10 @@ def add_tension_control(
         (distribution, driven, "tensions"),
     ):
         builder.Connect(before.GetOutputPort(port), after.GetInputPort(port))
-    if isinstance(control, RemoteTracking | ForceTracking):
-        builder.Connect(distribution.GetOutputPort("tensions"), control.GetInputPort("tensions"))
-    for block in (control, distribution):
-        if isinstance(block, RemoteTracking | RemoteDistributor):
-            builder.Connect(driven.GetOutputPort("lengths"), block.GetInputPort("lengths"))
+    for port, source in (("tensions", distribution), ("lengths", driven)):
+        for decider in (control, distribution):
+            if decider.HasInputPort(port):
+                builder.Connect(source.GetOutputPort(port), decider.GetInputPort(port))
     if isinstance(driven, TensionDrivenCables):
         apply_force(builder, in_plant.plant, driven.GetOutputPort("generalized_force"), name=name)
         brake = settings.damping.block(in_plant)
@@ -321,31 +328,6 @@ def add_tension_control(
         builder.Connect(wrench, pushed.get_input_port())
         apply_force(builder, in_plant.plant, pushed.get_output_port(), name=prefix + "pushed")
     return TensionControlBlocks(control, distribution, driven, real, state, wrench)
-
-
-def _deciders(
-    in_plant: RobotInPlant, settings: TensionControlSettings, believed: CableSet
-) -> tuple[PoseTracking, TensionDistributor]:
-    """Controller and distributor, or what stands in the place of one of them."""
-    trajectory, gains, place = settings.trajectory, settings.gains, settings.remote
-    balance, robot = settings.balance, in_plant.robot
-    dynamics = settings.dynamics or platform_dynamics(
-        robot, balance, damping=settings.damping.of(robot)
-    )
-    distribution = (settings.method, settings.limits, settings.rate, settings.reference, believed)
-    control, distributor = PoseTracking, settings.distributor
-    if place == DISTRIBUTOR:
-        remote = RemoteDistributor(in_plant, trajectory, *distribution, balance=balance)
-        return control(in_plant, trajectory, gains, dynamics, balance=balance), remote
-    own = distributor(in_plant, *distribution, balance=balance)
-    if settings.force is not None:
-        return ForceTracking(
-            in_plant, trajectory, gains, settings.force, believed, settings.rate,
-            dynamics=dynamics,
-        ), own  # fmt: skip
-    if place is None:
-        return control(in_plant, trajectory, gains, dynamics, balance=balance), own
-    return RemoteTracking(in_plant, trajectory, gains, place, dynamics, balance=balance), own
 
 
 def _split_state(builder: DiagramBuilder, motion: CompiledMotion, prefix: str) -> OutputPort:
@@ -399,11 +381,8 @@ def build_tension_control(
             logged[name] = blocks.distributor.GetOutputPort(name)
         if blocks.applied_wrench is not None:
             logged[APPLIED_WRENCH] = blocks.applied_wrench
-        if isinstance(blocks.controller, ForceTracking):
-            for name in ("wrench_estimated", "displacement"):
-                logged[name] = blocks.controller.GetOutputPort(name)
-        if settings.remote == TRAJECTORY:
-            logged["desired_motion"] = blocks.controller.GetOutputPort("desired_motion")
+        for name in blocks.controller.logged:
+            logged[name] = blocks.controller.GetOutputPort(name)
         if meters is not None and meters.contact is not None:
             logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)

@@ -16,6 +16,7 @@ from cdpr_drake.systems.controllers.computed_torque import PoseTracking
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
 from cdpr_drake.systems.robots.compiled_step import PackedRule, motion_problem
+from cdpr_drake.systems.robots.settings import COMPILED
 
 
 class TensionRows:
@@ -78,6 +79,8 @@ class TensionLoop(TensionRows):
     are the simulator's: state, tensions and log are the diagram's to the last bits. Blocks of
     somebody's own are not in it.
     """
+
+    name = COMPILED
 
     def __init__(
         self, control: TensionControl, log_rate: float, start: RigidTransform | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -25,8 +26,6 @@ from cdpr_drake.systems.diagrams.servo_watches import (
 from cdpr_drake.systems.monitoring.log_row import RunLog
 from cdpr_drake.systems.monitoring.run_monitor import RunMonitor
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
-from cdpr_drake.systems.remote.remote_place import Remote
-from cdpr_drake.systems.remote.remote_servo import RemoteServo
 from cdpr_drake.systems.robots.cable_robot import STEP_SHARE, CableRobot, automatic_step
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
 from cdpr_drake.systems.robots.compiled_motion import HELD
@@ -81,9 +80,9 @@ class VisualServo(VisualServoBlocks):
         return self.block
 
     @property
-    def remote(self) -> Remote | None:
-        """Where a process outside stands; None: nowhere."""
-        return self.servo.remote if isinstance(self.servo, RemoteServo) else None
+    def outside(self) -> Any:
+        """The place of a process outside, as the servo offers it; None: there is none."""
+        return getattr(self.servo, "outside", None)
 
     def true_pose(self, context: Context) -> RigidTransform:
         """X_WP of the platform [m], from the root context."""

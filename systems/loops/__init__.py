@@ -3,8 +3,7 @@
 `ServoLoop` calls what the blocks of a diagram call, the kernels of the robot and the methods of
 camera, servo, estimators, sensors, monitor and tension corrector that know no context, at the times
 and in the order of Drake's Simulator. `diagram_reason` says which scenarios it cannot do,
-`set_loop` chooses. `MotorTracking` tracks a trajectory by motors, and
-`RemoteTensionLoop` steps dynamic control that a process outside closes.
+`set_loop` chooses. `MotorTracking` tracks a trajectory by motors.
 """
 
 import lazy_loader

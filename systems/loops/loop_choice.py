@@ -58,8 +58,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its failures are a block of a diagram"
     if scenario.integration.engine == PLANT:
         return "its engine is the plant"
-    if scenario.remote is not None:
-        return "a process outside closes its loop"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
     if scenario.camera.pan_tilt is not None:

@@ -87,11 +87,6 @@ class PickAndPlaceScenario(CableRobotSettings, ScenarioHeader):
     integration: Annotated[PlantIntegration, "Integration."] = filled(PlantIntegration)
     log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 50.0
 
-    @property
-    def remote(self) -> None:
-        """A process outside in the place of a block: none is possible."""
-        return None
-
     def places(self) -> tuple[RigidTransform, RigidTransform]:
         """True poses of box and goal at time 0, X_WB and X_WG [m], by the seed."""
         random = np.random.default_rng([self.seed, PLACES])

@@ -146,9 +146,7 @@ def engine_of(scenario: Any) -> str:
 
 def needs_plant(scenario: Any) -> bool:
     """Whether the engine plant alone can run a scenario of any kind, contact aside."""
-    return getattr(scenario, "plant_alone", False) or any(
-        section.needs_plant(scenario) for _, section in sections_of(scenario)
-    )
+    return any(section.needs_plant(scenario) for _, section in sections_of(scenario))
 
 
 def many_steps_reason(scenario: Any, repeated: bool) -> str:

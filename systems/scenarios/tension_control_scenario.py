@@ -1,7 +1,6 @@
 """The schema of a scenario file for dynamic control by cable tensions.
 
-`TensionScenario` is the file; its sections stand before it. Section `predictive` asks for tensions
-by a program over the time ahead.
+`TensionScenario` is the file; its sections stand before it.
 """
 
 from pathlib import Path
@@ -11,19 +10,15 @@ import numpy as np
 
 from cdpr_drake.control.force_balance import BALANCES, WRENCH
 from cdpr_drake.control.task_space import TaskGains
-from cdpr_drake.errors import ScenarioError
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.models.camera_catalogue import load_camera
 from cdpr_drake.models.robot_schema import Pose, Robot
 from cdpr_drake.numerics.explicit_integration import explicit_integrators
-from cdpr_drake.planning.horizon import View
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Switch, Text, filled, settings
-from cdpr_drake.systems.controllers.force_tracking import ForceControl
-from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.compiled_step import StepRule
 from cdpr_drake.systems.robots.settings import AUTOMATIC, COMPILED, ENGINES, DampingSettings
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
+from cdpr_drake.systems.sections import with_sections
 from cdpr_drake.tensions.methods import METHODS
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 from cdpr_drake.trajectories.sampled_motion import read_motion
@@ -104,43 +99,6 @@ class DistributionSettings:
 
 
 @settings
-class PredictiveSettings:
-    """Predictive control in the place of computed torque, at the rate of `controller`.
-
-    Its program takes a millisecond or more: rates of 50 to 200 Hz are usual.
-    """
-
-    steps: Annotated[int, In(ge=2, le=100), "Steps of control that it looks ahead."] = 10
-    mount: Annotated[
-        Text | None,
-        "Mounting on the platform of the camera that keeps `points` in view; null: none.",
-    ] = None
-    points: Annotated[np.ndarray | None, In("m", None, 3), "Points in W that stay in view."] = None
-
-    def view(self, robot: Robot) -> View | None:
-        """What is kept in view.
-
-        Raises:
-            ScenarioError: The robot has no such camera on its platform, or one of mount and points
-                is missing.
-        """
-        if (self.mount is None) != (self.points is None):
-            missing = "mount" if self.mount is None else "points"
-            raise ScenarioError(f"predictive.{missing}: found null; accepted: both, or neither")
-        if self.mount is None or self.points is None:
-            return None
-        known = [mount for mount in robot.cameras if mount.parent == "platform"]
-        found = [mount for mount in known if mount.name == self.mount]
-        if not found:
-            names = ", ".join(mount.name for mount in known) or "none on its platform"
-            raise ScenarioError(
-                f"predictive.mount: found {self.mount!r}; accepted for {robot.name}: {names}"
-            )
-        slopes = load_camera(found[0].model).view_slopes()
-        return View(found[0].pose.transform(), slopes, self.points.T)
-
-
-@settings
 class StepSettings:
     """How the robot is integrated."""
 
@@ -179,6 +137,7 @@ class TensionStop:
 
 
 @settings
+@with_sections("tension_control")
 class TensionScenario(ScenarioHeader):
     """One run of a robot that follows a trajectory by commanded tensions."""
 
@@ -194,29 +153,12 @@ class TensionScenario(ScenarioHeader):
     distribution: Annotated[DistributionSettings, "Tension distribution."] = filled(
         DistributionSettings
     )
-    predictive: Annotated[
-        PredictiveSettings | None,
-        "Tensions by a program over the time ahead, in the place of computed torque; null: none.",
-    ] = None
-    force_control: Annotated[
-        ForceControl | None,
-        "How the platform answers forces, by the engine plant; null: as computed torque does.",
-    ] = None
     integration: Annotated[StepSettings, "Integration."] = filled(StepSettings)
     perturbations: Annotated[TensionBelief, "What the controller believes wrongly."] = filled(
         TensionBelief
     )
-    remote: Annotated[
-        RemoteSettings | None,
-        "A process outside in the place of a block, see cdpr serve; null: none.",
-    ] = None
     stop: Annotated[TensionStop, "When the run ends early."] = filled(TensionStop)
     log_rate: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Rows of the log per second."] = 100.0
-
-    @property
-    def plant_alone(self) -> bool:
-        """Whether the engine plant alone can run it."""
-        return self.force_control is not None
 
     def step_rule(self) -> StepRule | None:
         """How the robot is integrated in compiled steps; None by the engine plant."""

@@ -21,7 +21,6 @@ from cdpr_drake.systems.controllers.servo_settings import (
 from cdpr_drake.systems.controllers.tension_management_settings import TensionManagement
 from cdpr_drake.systems.controllers.torque_settings import TorqueControl
 from cdpr_drake.systems.estimators.estimator_kinds import EstimatorSettings
-from cdpr_drake.systems.remote.settings import RemoteSettings
 from cdpr_drake.systems.robots.settings import CableRobotSettings
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import (
@@ -71,10 +70,6 @@ class VisualServoSettings:
         "How winches are commanded by torque, with winches.mode torque; null: its defaults.",
     ] = None
     perturbations: Annotated[Perturbations, "Model errors."] = filled(Perturbations)
-    remote: Annotated[
-        RemoteSettings | None,
-        "A process outside in the place of a block, see cdpr serve; null: none.",
-    ] = None
 
     def tasks(self) -> list[NextTask]:
         """The desired poses in the order of their times; the first one holds from time 0."""

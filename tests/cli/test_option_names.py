@@ -13,8 +13,8 @@ from cdpr_drake.analyses.workspaces.workspace import compute_workspace
 from cdpr_drake.cli.call import parsed
 from cdpr_drake.cli.option_names import COMMAND_WORDS, with_options
 from cdpr_drake.errors import CdprError
+from cdpr_drake.sections.remote.server_socket import ServerSocket
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.remote.server_socket import ServerSocket
 from tests.cli.commands import run
 
 SCENARIO, TORQUES = "acrobot_pbvs", "acrobot_computed_torque"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.analyses.runs.run import Run, Subject
+from cdpr_drake.sections.force_control.report import FORCES
 from cdpr_drake.systems.robots.platform_wrench import APPLIED_WRENCH
 from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 
@@ -21,10 +22,7 @@ def push_numbers(run: Run) -> dict[str, float]:
 
 
 SUBJECTS = (
-    Subject(
-        "disturbances",
-        push_numbers,
-        applies=lambda run: APPLIED_WRENCH in run.log and run.kind != TENSION_CONTROL,
-    ),
+    Subject("disturbances", push_numbers, applies=lambda run: run.kind != TENSION_CONTROL),
+    FORCES,
 )
 """What a run reports of the section; dynamic control has its own numbers of forces."""

@@ -1,6 +1,7 @@
 """Laws that answer forces, and predictive tensions: formulas, least squares, measured energy."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -19,9 +20,9 @@ from cdpr_drake.planning.horizon import EFFORT, TIME_CONSTANT, Horizon, View
 from cdpr_drake.planning.limits import MotionLimits
 from cdpr_drake.planning.path_task import PathTask
 from cdpr_drake.sections.disturbances.section import DisturbanceSettings, Push
+from cdpr_drake.sections.predictive.section import PredictiveDistributor
 from cdpr_drake.systems.controllers.computed_torque import platform_dynamics
 from cdpr_drake.systems.controllers.plant_following import MotorFollower
-from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_control import (
@@ -247,7 +248,8 @@ def test_a_predictive_platform_stays_where_the_target_is_seen():
     for name, seen in (("blind", None), ("seeing", view)):
         settings = TensionControlSettings(
             trajectory=motion, gains=TaskGains(stiffness=100.0, damping=20.0),
-            limits=(1.0, 60.0), rate=50.0, distributor=PredictiveTensions(motion, 5, seen),
+            limits=(1.0, 60.0), rate=50.0,
+            distributor=partial(PredictiveDistributor, trajectory=motion, steps=5, view=seen),
             rule=StepRule(method="runge_kutta3", max_step=1e-3),
         )  # fmt: skip
         control = build_tension_control(ROBOT, settings, log_rate=50.0)
@@ -266,7 +268,8 @@ def test_foresight_stays_nearer_to_a_motion_that_the_cables_cannot_give():
         (RigidTransform([0.0, 0.0, 0.2]), RigidTransform([0.15, -0.1, 0.4])), (0.45,), 0.1
     )
     errors, failures = {}, {}
-    for rate, distributor in ((1000.0, TensionDistributor), (100.0, PredictiveTensions(motion, 5))):
+    ahead = partial(PredictiveDistributor, trajectory=motion, steps=5)
+    for rate, distributor in ((1000.0, TensionDistributor), (100.0, ahead)):
         settings = TensionControlSettings(
             trajectory=motion, gains=TaskGains(stiffness=100.0, damping=20.0), limits=(1.0, 60.0),
             rate=rate, distributor=distributor, rule=StepRule(method="runge_kutta3", max_step=1e-3),

@@ -161,7 +161,7 @@ CALLS = {
         ScenarioError, "predictive.points: found null"),
     "mount to see": (
         lambda: planar_run("predictive.mount=nose", "predictive.points=[[0, 0, 0]]"),
-        ScenarioError, "predictive.mount: found 'nose'; accepted for planar: onboard"),
+        ScenarioError, "predictive.mount: found 'nose'; accepted: onboard, on the platform"),
     "method": (lambda: block("foo"), TensionProblemError, "method: found foo"),
     "limits": (lambda: block(limits=(9.0, 1.0)), TensionProblemError, "lower <= upper"),
     "reference": (lambda: block("reference_program"), TensionProblemError, "no reference"),

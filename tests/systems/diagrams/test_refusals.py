@@ -1,12 +1,14 @@
 """Sections of scenarios whose diagram cannot be built are refused in one line that names them."""
 
+from functools import partial
+
 import pytest
 import yaml
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, PlanningError, ScenarioError
 from cdpr_drake.models.robot_loader import load_robot, robot_file
-from cdpr_drake.systems.controllers.predictive_tensions import PredictiveTensions
+from cdpr_drake.sections.predictive.section import PredictiveDistributor
 from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.tension_loop import TensionLoop, can_be_compiled
@@ -217,7 +219,8 @@ def test_torque_without_motor_inertia_is_refused(tmp_path, capsys):
 
 def test_prediction_refuses_forces_alone():
     home = load_robot("acrobot_large").home.transform()
-    ahead = PredictiveTensions(PoseTrajectory((home, home), (1.0,)), 5)
+    motion = PoseTrajectory((home, home), (1.0,))
+    ahead = partial(PredictiveDistributor, trajectory=motion, steps=5)
     with pytest.raises(PlanningError, match="balance: found force; accepted by predictive: wrench"):
         dynamic_control(balance="force", distributor=ahead)
 

@@ -113,7 +113,7 @@ REFUSED = {
         (FORCE, "distribution.method=barycenter"): (
             "barycenter: found redundancy m - n = 5; accepted: 2"
         ),
-        (FORCE, "predictive={steps: 5}"): (
+        (FORCE, "distribution.method=quadratic_program", "predictive={steps: 5}"): (
             "controller.balance: found force beside predictive; accepted"
         ),
         ("cables.pulleys=true", IN_PULLEY): re.compile(r"trajectory\.start: .*pulley"),

@@ -12,7 +12,7 @@ from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.systems.remote.messages import shown, vector
+from cdpr_drake.sections.remote.messages import shown, vector
 from cdpr_drake.tensions.methods import distribute
 
 UNIT = 1e-6
@@ -31,7 +31,7 @@ def tension_service(
     method: str,
     cables: CableSet | None = None,
 ) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
-    """What answers the request "distribute" of `cdpr_drake.systems.remote`.
+    """What answers the request "distribute" of `cdpr_drake.sections.remote`.
 
     Args:
         robot: The robot.

@@ -25,13 +25,14 @@ from cdpr_drake.analyses.runs.run import Run
 from cdpr_drake.analyses.runs.scenarios import scenario_with
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.errors import ClientEndedError
+from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.remote.messages import PROTOCOL, check_available
-from cdpr_drake.systems.remote.remote_client import LOCAL_HOST, USUAL_PORT
-from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
-from cdpr_drake.systems.remote.remote_place import SERVO_PLACES, TENSION_PLACES, Remote
-from cdpr_drake.systems.remote.server_socket import ServerSocket, is_loopback
-from cdpr_drake.systems.remote.service import tension_service
+from cdpr_drake.sections.remote.client import LOCAL_HOST, USUAL_PORT
+from cdpr_drake.sections.remote.driver import Driver, SyncMode
+from cdpr_drake.sections.remote.messages import PROTOCOL, check_available
+from cdpr_drake.sections.remote.place import SERVO_PLACES, TENSION_PLACES, Remote
+from cdpr_drake.sections.remote.server_socket import ServerSocket
+from cdpr_drake.sections.remote.service import tension_service
 from cdpr_drake.systems.scenarios.files import check_moves_robot
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
@@ -49,7 +50,7 @@ def serve(
 ) -> Run:  # fmt: skip
     """Runs a scenario with an external process in its loop, over ZeroMQ.
 
-    The client may be in any language: cdpr_drake.systems.remote documents the messages and offers
+    The client may be in any language: cdpr_drake.sections.remote documents the messages and offers
     RemoteClient for Python. notebooks/plain_client.py is a client that does not use this package.
 
     Args:

@@ -14,9 +14,9 @@ import pytest
 
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.remote.messages import LARGEST, decode
-from cdpr_drake.systems.remote.remote_driver import Driver, Port, SyncMode
-from cdpr_drake.systems.remote.service import tension_service
+from cdpr_drake.sections.remote.driver import Driver, Port, SyncMode
+from cdpr_drake.sections.remote.messages import LARGEST, decode
+from cdpr_drake.sections.remote.service import tension_service
 
 COUNT = 1000
 """Messages of each pace and state."""

@@ -11,11 +11,11 @@ from cdpr_drake.analyses.frame.follow import Follow
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.tension import TensionRun
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.sections.remote.client import RemoteClient
+from cdpr_drake.sections.remote.driver import Driver, SyncMode
+from cdpr_drake.sections.remote.server_socket import ServerSocket
+from cdpr_drake.sections.remote.service import tension_service
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, SyncMode
-from cdpr_drake.systems.remote.server_socket import ServerSocket
-from cdpr_drake.systems.remote.service import tension_service
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 
 LONG = 1800.0

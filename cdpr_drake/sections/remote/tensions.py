@@ -23,9 +23,7 @@ from cdpr_drake.geometry.poses import pose_from_row, pose_row
 from cdpr_drake.geometry.straight_cables import gravity_wrench
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_from_state
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.controllers.computed_torque import PoseTracking
-from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
-from cdpr_drake.systems.remote.remote_place import (
+from cdpr_drake.sections.remote.place import (
     CONTROLLER,
     DISTRIBUTOR,
     TRAJECTORY,
@@ -33,6 +31,8 @@ from cdpr_drake.systems.remote.remote_place import (
     Remote,
     tension_ports,
 )
+from cdpr_drake.systems.controllers.computed_torque import PoseTracking
+from cdpr_drake.systems.controllers.tension_distributor import TensionDistributor
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, PoseTrajectory, write_motion
 
 LEAST_NORM = 1e-6
@@ -88,9 +88,9 @@ class RemoteTracking(PoseTracking):
         in_plant: RobotInPlant,
         trajectory: PoseTrajectory,
         gains: TaskGains,
-        place: str,
         dynamics: PlatformDynamics | None = None,
         *,
+        place: str,
         balance: str = WRENCH,
     ) -> None:
         """Arguments as of `PoseTracking`; place is CONTROLLER or TRAJECTORY."""
@@ -103,8 +103,9 @@ class RemoteTracking(PoseTracking):
             CONTROLLER: {"desired_wrench": _holding(robot)},
             TRAJECTORY: {"desired_motion": self.view.motion(0.0)},
         }
-        self.remote = Remote(place, inputs, outputs, resting[place])
+        self.outside = Remote(place, inputs, outputs, resting[place])
         self._by_motion = place == TRAJECTORY
+        self.logged = ("desired_motion",) if self._by_motion else ()
         for name in ("tensions", "lengths"):
             self.DeclareVectorInputPort(name, len(robot.cables))
         state = self.GetInputPort("platform_state").get_index()
@@ -119,7 +120,7 @@ class RemoteTracking(PoseTracking):
         """
         if not self._by_motion:
             return self.view.motion(time)
-        motion = np.asarray(self.remote.ask(time, read)["desired_motion"])
+        motion = np.asarray(self.outside.ask(time, read)["desired_motion"])
         norm = math.hypot(*motion[:4])
         if not LEAST_NORM <= norm <= 1.0 / LEAST_NORM:
             raise ClientEndedError(
@@ -141,7 +142,7 @@ class RemoteTracking(PoseTracking):
             out: Gets the wrench.
         """
         if not self._by_motion:
-            out[:] = self.remote.ask(time, read)["desired_wrench"]
+            out[:] = self.outside.ask(time, read)["desired_wrench"]
         elif self._height is None:
             floating_wrench(state, motion, self._dynamics, self._gains, out)
         else:
@@ -178,11 +179,13 @@ class RemoteDistributor(TensionDistributor):
     each update; `feasible` is 1, and there are no failures: nobody here knows what it wants.
     """
 
+    source = "client"
+
     def __init__(
         self,
         in_plant: RobotInPlant,
-        trajectory: PoseTrajectory,
         *settings: Any,
+        trajectory: PoseTrajectory,
         balance: str = WRENCH,
     ) -> None:
         """With the desired motion that the process can see, and what a `TensionDistributor` takes.
@@ -194,7 +197,7 @@ class RemoteDistributor(TensionDistributor):
         robot = in_plant.robot
         self.view = _View(robot, trajectory)
         inputs, outputs = tension_ports(DISTRIBUTOR, robot)
-        self.remote = Remote(
+        self.outside = Remote(
             DISTRIBUTOR, inputs, outputs, {"tensions": self.packed().bounds[0].copy()}
         )
         self.DeclareVectorInputPort("lengths", len(robot.cables))
@@ -205,7 +208,7 @@ class RemoteDistributor(TensionDistributor):
         Raises:
             ClientEndedError: One is negative, or nobody is there.
         """
-        found = self.remote.ask(time, read)["tensions"]
+        found = self.outside.ask(time, read)["tensions"]
         least = min(found.tolist())  # NumPy's takes several times as long for a few numbers
         if least < 0.0:
             raise ClientEndedError(

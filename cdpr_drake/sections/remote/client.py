@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BridgeError
-from cdpr_drake.systems.remote.messages import (
+from cdpr_drake.sections.remote.messages import (
     LARGEST,
     MSGPACK,
     NUMBER,
@@ -45,7 +45,7 @@ class RemoteClient:
         with RemoteClient() as client:
             client.run(lambda now: {"tensions": my_tensions(now.time, now.outputs["X_WP"])})
 
-    Each call sends one message and waits for its reply. Messages: see `cdpr_drake.systems.remote`.
+    Each call sends one message and waits for its reply. Messages: see `cdpr_drake.sections.remote`.
     """
 
     def __init__(

@@ -19,7 +19,7 @@ from cdpr_drake.cli.process import INTERRUPTED
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.systems.remote.remote_client import RemoteClient
+from cdpr_drake.sections.remote.client import RemoteClient
 from tests.cli.commands import ended, refuse
 from tests.cli.conftest import only
 from tests.messages import printed

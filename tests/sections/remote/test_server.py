@@ -17,8 +17,9 @@ from cdpr_drake.errors import BridgeError, ClientEndedError
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.systems.monitoring.run_monitor import Outcome
-from cdpr_drake.systems.remote.messages import (
+from cdpr_drake.sections.remote.client import RemoteClient
+from cdpr_drake.sections.remote.driver import Driver, Port, SyncMode
+from cdpr_drake.sections.remote.messages import (
     JSON,
     LARGEST,
     MSGPACK,
@@ -27,11 +28,10 @@ from cdpr_drake.systems.remote.messages import (
     listed,
     vector,
 )
-from cdpr_drake.systems.remote.remote_client import RemoteClient
-from cdpr_drake.systems.remote.remote_driver import Driver, Port, SyncMode
-from cdpr_drake.systems.remote.server_socket import SLICE, ServerSocket
+from cdpr_drake.sections.remote.server_socket import SLICE, ServerSocket
+from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.tensions.methods import distribute
-from tests.systems.remote.served import LONG, beside, scenario, server
+from tests.sections.remote.served import LONG, beside, scenario, server
 
 HOLD = {"tensions": [4.0] * 8}
 STEPS = 7
@@ -197,7 +197,7 @@ def test_a_silent_client(pace, timeout, raw):
         assert run.sim_time == pytest.approx(1e-3)
     else:
         assert run.sim_time < 60.0
-        assert run.built.remote.report()["held_steps"] > 0
+        assert run.built.outside.report()["held_steps"] > 0
 
 
 def test_stop_by_the_client():
@@ -269,7 +269,7 @@ def test_strangers_are_answered_and_change_nothing():
     run, end = served(drive)
     assert run.outcome == Outcome.COMPLETED, end
     assert end["outcome"] == "completed"
-    assert run.built.remote.report()["services"] == 3
+    assert run.built.outside.report()["services"] == 3
 
 
 def test_nobody_comes_nowhere_to_listen_and_nobody_serves():
@@ -292,7 +292,7 @@ def test_nobody_comes_nowhere_to_listen_and_nobody_serves():
 
 def test_a_client_needs_neither_drake_nor_numba():
     words = (
-        "import sys, cdpr_drake.systems.remote.remote_client; "
+        "import sys, cdpr_drake.sections.remote.client; "
         "print([m for m in ('pydrake', 'numba', 'zmq', 'msgpack', 'scipy') if m in sys.modules])"
     )
     done = subprocess.run(
@@ -338,7 +338,7 @@ def test_in_real_time_a_command_holds_until_the_next():
     assert set(commanded) <= {3.0, 5.0}
     assert np.all(np.diff(commanded) >= 0.0)
     assert np.count_nonzero(commanded == 3.0) > 1
-    report = run.built.remote.report()
+    report = run.built.outside.report()
     assert report["held_steps"] > 0
     assert report["exchanges"] + report["held_steps"] >= len(commanded) - 1
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import ipaddress
 import socket as sockets
 import time
 from collections.abc import Callable
 from typing import Any
 
 from cdpr_drake.errors import BridgeError, ClientEndedError
-from cdpr_drake.systems.remote.messages import JSON, LARGEST, check_available, encode
+from cdpr_drake.sections.remote.messages import JSON, LARGEST, check_available, encode
 
 SLICE = 0.05
 """Time between looks whether the client is still there, or somebody asks to stop [s]."""
@@ -185,11 +184,3 @@ def parsed(frames: list[Any]) -> tuple[int, int]:
 
     event = parse_monitor_message(frames)
     return int(event["event"]), int(event["value"])
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a host."""
-    try:
-        return ipaddress.ip_address(sockets.gethostbyname(host)).is_loopback
-    except (OSError, UnicodeError, ValueError):
-        return False

@@ -15,7 +15,7 @@ import numpy as np
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import ClientEndedError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.systems.remote.remote_driver import Port
+from cdpr_drake.sections.remote.driver import Port
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE
 
 Read = Callable[[str], Array]
@@ -23,7 +23,7 @@ Read = Callable[[str], Array]
 
 
 class Commander(Protocol):
-    """Who gives commands; `systems.remote.Driver` does."""
+    """Who gives commands; `sections.remote.Driver` does."""
 
     def exchange(self, now: float, read: Read) -> Mapping[str, Array]:
         """Commands at a time [s], by the names of the inputs."""

@@ -16,7 +16,7 @@ from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.monitoring.run_monitor import Outcome
 from cdpr_drake.tensions.control_step_kernel import update_tensions_at
 from cdpr_drake.trajectories.pose_trajectory import MOTION_SIZE, write_motion
-from tests.systems.remote.served import assert_same_log, driven, scenario
+from tests.sections.remote.served import assert_same_log, driven, scenario
 
 ENGINES = ("compiled", "plant")
 
@@ -81,7 +81,7 @@ def test_tension_control(inside, engine, place):
     assert run.outcome == Outcome.COMPLETED
     assert run.loop == ("diagram" if engine == "plant" else "remote")
     assert_same_log(run, inside[engine])
-    report = run.built.remote.report()
+    report = run.built.outside.report()
     assert report["exchanges"] == (50 if place == "distributor" else 51)  # and the log's last row
     assert report["codec"] == codec
 

@@ -1,7 +1,8 @@
-"""Scenario section `force_control` of dynamic control, and its block: laws that answer forces."""
+"""Section `force_control` of dynamic control, and its block: laws that answer forces."""
 
-from collections.abc import Iterator
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -14,6 +15,7 @@ from pydrake.systems.framework import (
 )
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.control.force_balance import WRENCH
 from cdpr_drake.control.force_laws import (
     Admittance,
     displaced,
@@ -35,6 +37,7 @@ from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.geometry.poses import rotation_from_angles
 from cdpr_drake.models.robot_in_plant import RobotInPlant, pose_on_joint
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import rigid_platform
 from cdpr_drake.schema.declarations import (
     In,
@@ -47,7 +50,9 @@ from cdpr_drake.schema.declarations import (
     values,
 )
 from cdpr_drake.schema.typed_yaml import refuse
+from cdpr_drake.sections.wrench_estimation.section import ESTIMATED, PARTS
 from cdpr_drake.systems.controllers.computed_torque import PoseTracking, platform_dynamics
+from cdpr_drake.systems.sections import Section
 from cdpr_drake.trajectories.pose_trajectory import PoseTrajectory
 
 TRACKING, IMPEDANCE, ADMITTANCE, HYBRID = "tracking", "impedance", "admittance", "hybrid"
@@ -55,14 +60,23 @@ TRACKING, IMPEDANCE, ADMITTANCE, HYBRID = "tracking", "impedance", "admittance",
 AXES = ("x", "y", "z")
 """Axes of the task frame."""
 
+DISPLACEMENT = "displacement"
+"""Output: how far an admittance has moved the trajectory."""
 
 TOUCHES = 0.2
 """Share of the wanted force from which something is touched: what is missing is gathered then."""
 
 
 @settings
-class ForceControl:
+class ForceControl(Section):
     """How the platform answers forces, in the place of plain computed torque."""
+
+    words = "How the platform answers forces, by the engine plant, beside computed torque"
+    columns: ClassVar = {
+        ESTIMATED: PARTS,
+        DISPLACEMENT: ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
+    }
+    report = "cdpr_drake.sections.force_control.report:SUBJECTS"
 
     kind: Annotated[
         str,
@@ -116,7 +130,7 @@ class ForceControl:
     ] = False
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """What is missing or belongs to another kind, and robots that it is not for."""
+        """What is missing or belongs to another kind, and what it is not for."""
         needs = {IMPEDANCE: ("stiffness", "damping"), ADMITTANCE: ("stiffness", "damping", "mass")}
         for name in ("stiffness", "damping", "mass"):
             is_needed = name in needs.get(self.kind, ())
@@ -135,6 +149,23 @@ class ForceControl:
                 yield name, f"{found} with {self.kind}", accepted
         if not scope.robot.motion_type().is_free:
             yield "", f"a section for {scope.robot.name}, {scope.robot.motion}", "3R3T"
+        if scope.whole is self:  # of nobody's scenario
+            return
+        for other in ("remote", "predictive"):
+            if getattr(scope.whole, other, None) is not None:
+                yield "", f"beside {other}", "one of both"
+        if scope.whole.controller.balance != WRENCH:
+            found = f"{scope.whole.controller.balance} beside force_control"
+            yield "/controller.balance", found, WRENCH
+
+    def needs_plant(self, scenario: Any) -> bool:
+        """Always: no kernel has its laws."""
+        return True
+
+    def tension_blocks(self, settings: Any, robot: Robot) -> Mapping[str, Any]:
+        """Makes a `ForceTracking`."""
+        about = {"rate": settings.rate, "cables": settings.believed_cables}
+        return {"controller": partial(ForceTracking, settings=self, **about)}
 
     def pressed(self) -> Array:
         """1 for axes of T that press, else 0, shape (6,)."""
@@ -160,16 +191,19 @@ class ForceTracking(PoseTracking):
     What it gathers it samples at the rate of control; the wrench follows the state at once.
     """
 
+    logged = (ESTIMATED, DISPLACEMENT)
+
     def __init__(
         self,
         in_plant: RobotInPlant,
         trajectory: PoseTrajectory,
         gains: TaskGains,
-        settings: ForceControl,
-        cables: CableSet,
-        rate: float,
-        *,
         dynamics: PlatformDynamics | None = None,
+        *,
+        settings: ForceControl,
+        rate: float,
+        cables: CableSet | None = None,
+        balance: str = WRENCH,
     ) -> None:
         """For a robot whose plant is finalized, which moves freely.
 
@@ -177,17 +211,21 @@ class ForceTracking(PoseTracking):
             in_plant: The robot in its plant.
             trajectory: The desired motion.
             gains: Kp and Kd of computed torque.
-            settings: The section.
-            cables: The cables as they are believed to be.
-            rate: Steps of control per second [Hz].
             dynamics: What is believed of the platform; None for the exact model.
+            settings: The section.
+            rate: Steps of control per second [Hz].
+            cables: The cables as they are believed to be; None: the robot's, pulleys included.
+            balance: What tensions balance: the wrench.
 
         Raises:
             ScenarioError: The settings are not accepted.
         """
         refuse(settings, "force_control", robot=in_plant.robot, error=ScenarioError)
+        if balance != WRENCH:
+            raise ScenarioError(f"balance: found {balance}; accepted by force_control: {WRENCH}")
         super().__init__(in_plant, trajectory, gains, dynamics)
         robot = in_plant.robot
+        cables = robot.cable_set() if cables is None else cables
         self._settings, self._gains, self._cables = settings, gains, cables
         self._dynamics = dynamics or platform_dynamics(robot)
         self._period = 1.0 / rate
@@ -219,8 +257,8 @@ class ForceTracking(PoseTracking):
         self._tensions = self.DeclareVectorInputPort("tensions", cables.count).Eval
         self.DeclarePeriodicDiscreteUpdateEvent(self._period, 0.0, self._update)
         self.DeclareForcedDiscreteUpdateEvent(self._update)
-        self.DeclareStateOutputPort("wrench_estimated", DiscreteStateIndex(self._outer))
-        self.DeclareStateOutputPort("displacement", DiscreteStateIndex(self._moved))
+        self.DeclareStateOutputPort(ESTIMATED, DiscreteStateIndex(self._outer))
+        self.DeclareStateOutputPort(DISPLACEMENT, DiscreteStateIndex(self._moved))
 
     def _declare_memory(self) -> set[DependencyTicket]:
         """States on which the wrench depends, beside the platform's."""

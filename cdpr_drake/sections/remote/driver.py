@@ -10,8 +10,8 @@ from typing import Any
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import BridgeError, CdprError, ClientEndedError, accepted_names
-from cdpr_drake.systems.remote.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
-from cdpr_drake.systems.remote.server_socket import GONE, ServerSocket
+from cdpr_drake.sections.remote.messages import JSON, MSGPACK, decode, encode, listed, shown, vector
+from cdpr_drake.sections.remote.server_socket import GONE, ServerSocket
 
 GRACE = 5.0
 """Time for which a client that is busy while the run ends is waited for, to tell it [s]."""

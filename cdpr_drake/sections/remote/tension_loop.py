@@ -27,10 +27,10 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import pose_error, pose_from_row
 from cdpr_drake.models.robot_in_plant import pose_from_state
 from cdpr_drake.numerics.kernel_calls import array_addresses
+from cdpr_drake.sections.remote.place import TRAJECTORY
+from cdpr_drake.sections.remote.tensions import RemoteDistributor, RemoteTracking
 from cdpr_drake.systems.diagrams.tension_control import TensionControl
 from cdpr_drake.systems.diagrams.tension_loop import TensionRows
-from cdpr_drake.systems.remote.remote_place import TRAJECTORY
-from cdpr_drake.systems.remote.remote_tensions import RemoteDistributor, RemoteTracking
 from cdpr_drake.systems.robots.compiled_step import PackedRule, motion_problem
 from cdpr_drake.tensions.control_step_kernel import update_tensions_at
 from cdpr_drake.tensions.quadratic_program_kernel import FEASIBLE
@@ -48,6 +48,8 @@ class RemoteTensionLoop(TensionRows):
     last bits; it asks at the same times.
     """
 
+    name = "remote"
+
     def __init__(self, control: TensionControl, log_rate: float) -> None:
         """At the beginning of the trajectory, at rest.
 
@@ -58,13 +60,12 @@ class RemoteTensionLoop(TensionRows):
         Raises:
             CdprError: A plant moves the robot, or there is no remote place.
         """
-        motion, remote = control.motion, control.remote
+        motion, remote = control.motion, control.outside
         if motion is None or remote is None:
             raise CdprError(
                 f"remote loop of {control.robot.name}: found a plant or no remote place; accepted: "
                 "the engine compiled with a place"
             )
-        self.remote = remote
         blocks = control.blocks
         tracking, distributor = blocks.controller, blocks.distributor
         self._tracking = tracking if isinstance(tracking, RemoteTracking) else None
@@ -185,4 +186,4 @@ class RemoteTensionLoop(TensionRows):
 def can_be_stepped(control: TensionControl) -> bool:
     """Whether a `RemoteTensionLoop` can take the place of a diagram."""
     stops = control.meters is not None and control.meters.stop is not None
-    return control.remote is not None and control.motion is not None and not stops
+    return control.outside is not None and control.motion is not None and not stops

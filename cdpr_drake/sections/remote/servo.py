@@ -12,9 +12,9 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.cable_rates import cable_rates_from_platform_twist
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.sections.remote.place import TWIST, Remote, servo_ports
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
-from cdpr_drake.systems.remote.remote_place import TWIST, Remote, servo_ports
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
@@ -49,7 +49,7 @@ class RemoteServo(FeatureServo):
         m = len(robot.cables)
         inputs, outputs = servo_ports(place, robot, (target.mark, target.size), controller.size)
         none = {"cable_velocities": np.zeros(m), "platform_velocity": np.zeros(6)}
-        self.remote = Remote(place, inputs, outputs, none)
+        self.outside = Remote(place, inputs, outputs, none)
         for name in ("tensions", "lengths"):
             self.DeclareVectorInputPort(name, m)
 
@@ -68,7 +68,7 @@ class RemoteServo(FeatureServo):
             found = read(name)
             return pose_row(found) if isinstance(found, RigidTransform) else found
 
-        given = self.remote.ask(time, see)
+        given = self.outside.ask(time, see)
         twist = np.asarray(given["platform_velocity"])
         outputs["platform_velocity"] = twist
         if self._by_twist:

@@ -1,0 +1,1 @@
+"""Section `force_control` of dynamic control: how the platform answers forces."""

@@ -1,0 +1,3 @@
+"""Tests of `cdpr_drake.sections.remote`."""
+
+"""Tests of `cdpr_drake.sections.remote`."""

@@ -1,3 +1,0 @@
-"""Tests of `cdpr_drake.systems.remote`."""
-
-"""Tests of `cdpr_drake.systems.remote`."""
