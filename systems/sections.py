@@ -264,7 +264,7 @@ def with_sections(place: str) -> Callable[[type], type]:
 def sections_at(place: str) -> dict[str, type[Section]]:
     """Classes of the sections of a place, by their keys.
 
-    Another package's section that cannot be imported is left out, with a warning.
+    One that cannot be imported is left out, with a warning; a fault in one of this package raises.
     """
     classes = {}
     foreign = {point.name: point.value for point in entry_points(group=GROUP)}
@@ -275,9 +275,9 @@ def sections_at(place: str) -> dict[str, type[Section]]:
         try:
             section = load_object(target)
         except Exception as problem:
-            if name in SECTIONS:
+            if name in SECTIONS and not isinstance(problem, ModuleNotFoundError):
                 raise
-            _LOG.warning("entry point %s = %s: left out: %s", name, target, problem)
+            _LOG.warning("section %s = %s: left out: %s", name, target, problem)
             continue
         classes[key] = section
     return classes
