@@ -321,10 +321,12 @@ def test_every_sensor_loads_and_names_itself_and_refuses_what_none_is(names, loa
 
 @pytest.mark.parametrize("top", ["cdpr_drake", "systems", "analyses", "notebooks", "README.md"])
 def test_bare_points_do_not_leave_the_models(top):
-    """Cables go as a `CableSet`, so that pulleys cannot get lost."""
+    """Cables go as a `CableSet`, so that pulleys cannot get lost; drafts of files have none."""
     # rglob does not follow the links cdpr_drake/{models,systems,analyses}.
     root = Path(__file__).parents[2] / top
+    formats = Path(__file__).parents[2] / "cdpr_drake" / "formats"
     paths = [path for path in root.rglob("*") if path.suffix in (".py", ".ipynb")]
+    paths = [path for path in paths if not path.is_relative_to(formats)]
     for path in paths or [root]:
         found = re.search(r"\.(exit_points|anchor_points)\(\)", path.read_text())
         assert found is None, f"{path}: {found}"

@@ -17,8 +17,9 @@ RULES = ("tests/test_architecture.py", "tests/test_packaging.py")
 
 ABOUT_THE_PROJECT = (
     "not readme and not links and not citation and not changelog and not folder_says and not hook"
+    " and not any_wing"
 )
-"""What of these needs no copy."""
+"""What of these needs no copy, or starts a process, which has the modules of the project."""
 
 OF_ONE_ROOM = "face_holds or public_name or every_room"
 """What of these is asked of rooms one by one: here of those that a recipe touches."""

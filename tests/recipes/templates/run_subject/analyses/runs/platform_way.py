@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cdpr_drake.analyses.frame.figures import draw_curve, new_figure
-from cdpr_drake.analyses.runs.run import Run, Section
+from cdpr_drake.analyses.runs.run import Run, Subject
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import DISTANCE
 
@@ -32,4 +32,4 @@ def figure(run: Run) -> Figure:
     return drawn
 
 
-WAY = Section("platform_way", lambda run: True, numbers, {"platform_way": figure})
+WAY = Subject("platform_way", numbers, {"platform_way": figure})
