@@ -19,9 +19,14 @@ from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder
 
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.declarations import Refusal, Scope
+from cdpr_drake.schema.declarations import Refusal, Scope, filled
 
 SECTIONS = {
+    "camera.pan_tilt": "cdpr_drake.sections.pan_tilt.section:CameraPanTilt",
+    "sensors.pan_tilt": "cdpr_drake.sections.perception.section:PanTiltSettings",
+    "sensors.range_sensors": "cdpr_drake.sections.perception.section:RangeSettings",
+    "sensors.depth": "cdpr_drake.sections.perception.section:DepthSettings",
+    "sensors.odometry": "cdpr_drake.sections.perception.section:OdometrySettings",
     "visual_servo.wrench_estimation": (
         "cdpr_drake.sections.wrench_estimation.section:WrenchEstimation"
     ),
@@ -36,7 +41,7 @@ SECTIONS = {
     "tension_control.predictive": "cdpr_drake.sections.predictive.section:PredictiveSettings",
 }
 """Module and class of each section, by the place of its key in scenarios: `robot_scenario` is every
-kind but that of mechanisms."""
+kind but that of mechanisms. At a place, in the order in which they add their blocks."""
 
 GROUP = "cdpr_drake.sections"
 """Entry points of other packages' sections."""
@@ -75,6 +80,8 @@ class Section:
         words: What the key of a scenario means.
         columns: By the names of the quantities that it logs: what their numbers are called in
             `log.csv`, each name ending in its unit; or the unit alone, of a number for each cable.
+        many: True if the key has a list of such sections, each of which adds its own.
+        needs_rendering: True if its blocks draw images, for which EGL is needed.
         report: Module and name of the `Subject`s of a run, as "package.module:NAME"; empty: none.
         by_hand: By what can be done by hand to a run that goes on, see `do`: the section's least
             content, as YAML, which lets it be done and changes nothing. Of `robot_scenario` only.
@@ -84,6 +91,8 @@ class Section:
 
     words: ClassVar[str]
     columns: ClassVar[Mapping[str, Sequence[str] | str]] = {}
+    many: ClassVar[bool] = False
+    needs_rendering: ClassVar[bool] = False
     report: ClassVar[str] = ""
     by_hand: ClassVar[Mapping[str, str]] = {}
     outside: ClassVar[bool] = False
@@ -146,6 +155,27 @@ class Section:
         """
         return {}
 
+    def log_columns(self) -> Mapping[str, Sequence[str] | str]:
+        """`columns`, or others by these settings, which a run asks for."""
+        return self.columns
+
+    def sampling_rate(self) -> float | None:
+        """How often it reads, by its field `rate` [Hz], at most once an integration step; None: it
+        does not say."""
+        return None
+
+    def at_end(self, built: Any, context: Any) -> Mapping[str, Any]:
+        """What only the diagram knows at the end of a run.
+
+        Args:
+            built: The `VisualServo`.
+            context: The diagram's context.
+
+        Returns:
+            What `Run.at_end` has for the section's report, by names.
+        """
+        return {}
+
     def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort | None:
         """Adds what pushes the platform, in a scenario of any kind but a mechanism's.
 
@@ -183,11 +213,15 @@ def sections_of(settings: Any) -> Iterator[tuple[str, Section]]:
     """The sections that settings have, in the order of their fields, each with its key."""
     for field in dataclasses.fields(settings):
         value = getattr(settings, field.name)
-        if isinstance(value, Section):
-            yield field.name, value
-        elif dataclasses.is_dataclass(value):
-            for key, section in sections_of(value):
-                yield f"{field.name}.{key}", section
+        items = {field.name: value}
+        if isinstance(value, list):
+            items = {f"{field.name}[{k}]": item for k, item in enumerate(value)}
+        for key, item in items.items():
+            if isinstance(item, Section):
+                yield key, item
+            elif dataclasses.is_dataclass(item):
+                for inside, section in sections_of(item):
+                    yield f"{key}.{inside}", section
 
 
 def add_pushes(
@@ -216,8 +250,12 @@ def with_sections(place: str) -> Callable[[type], type]:
             if hasattr(kind, key) or key in kind.__annotations__:
                 _LOG.warning("section %s.%s: left out: the key is taken", place, key)
                 continue
-            kind.__annotations__[key] = Annotated[section | None, f"{section.words}; null: none."]
-            setattr(kind, key, None)
+            kind.__annotations__[key] = (
+                Annotated[list[section], section.words]  # type: ignore[valid-type]
+                if section.many
+                else Annotated[section | None, f"{section.words}; null: none."]
+            )
+            setattr(kind, key, filled(list) if section.many else None)
         return kind
 
     return extended
@@ -226,7 +264,7 @@ def with_sections(place: str) -> Callable[[type], type]:
 def sections_at(place: str) -> dict[str, type[Section]]:
     """Classes of the sections of a place, by their keys.
 
-    Another package's section that cannot be imported is left out, with a warning.
+    One that cannot be imported is left out, with a warning; a fault in one of this package raises.
     """
     classes = {}
     foreign = {point.name: point.value for point in entry_points(group=GROUP)}
@@ -237,9 +275,9 @@ def sections_at(place: str) -> dict[str, type[Section]]:
         try:
             section = load_object(target)
         except Exception as problem:
-            if name in SECTIONS:
+            if name in SECTIONS and not isinstance(problem, ModuleNotFoundError):
                 raise
-            _LOG.warning("entry point %s = %s: left out: %s", name, target, problem)
+            _LOG.warning("section %s = %s: left out: %s", name, target, problem)
             continue
         classes[key] = section
     return classes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -18,16 +19,15 @@ from cdpr_drake.analyses.frame.result import Result, Table
 from cdpr_drake.analyses.frame.verb import verb
 from cdpr_drake.analyses.frame.words import DEFAULT_FORMATS, Formats, OutFolder, words
 from cdpr_drake.analyses.reporting.log_files import finite
-from cdpr_drake.analyses.runs.log import PARTS, DiskLog, Log
+from cdpr_drake.analyses.runs.log import PARTS, DiskLog, Log, StoredLog
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import Stability, stability_along, stability_figure
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_ENCODERS, LOGGED_JOINTS
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 QUANTITIES = ("time", "X_WP", "X_WP_estimated", "tensions", "slack")
-"""Quantities of a log from which the criterion is computed; of a turning camera its joints, too."""
+"""Quantities of a log from which the criterion is computed, beside joints of a camera."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,16 +143,14 @@ def assess_run(
 
 
 def _log_of(folder: Path) -> Log:
-    """The quantities of a folder's log that are needed, or the log that a killed run left."""
+    """The log of a folder, or that which a killed run left."""
     accepted = "accepted: a folder of a visual servo that cdpr simulate wrote"
     if (folder / PARTS).is_dir():
         stored: Log = DiskLog(folder / PARTS)
     elif (folder / "log.npz").is_file() and (folder / "scenario.yaml").is_file():
         try:
-            with np.load(folder / "log.npz", allow_pickle=False) as arrays:
-                names = (*QUANTITIES, LOGGED_JOINTS, LOGGED_ENCODERS)
-                stored = {name: arrays[name] for name in names if name in arrays}
-        except (OSError, ValueError, EOFError) as problem:
+            stored = StoredLog(folder / "log.npz")
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile) as problem:
             raise OutputFolderError(f"{folder}: log.npz cannot be read: {problem}") from problem
     else:
         raise OutputFolderError(f"{folder}: found no log; {accepted}")

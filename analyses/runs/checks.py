@@ -8,8 +8,8 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError, ScenarioError, TensionProblemError
 from cdpr_drake.models.mechanism_schema import Mechanism
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.controllers.torque_settings import TORQUE
-from cdpr_drake.systems.diagrams.pan_tilt import aimed_mounting
 from cdpr_drake.systems.robots.cable_robot import (
     SEMI_IMPLICIT,
     STEP_SHARE,
@@ -42,12 +42,13 @@ def check_start(servo: Any) -> None:
     Raises:
         ScenarioError: It does not; says where the target would be.
     """
-    scenario, pinhole, joints = servo.scenario, servo.pinhole, servo.scenario.camera.pan_tilt
+    scenario, pinhole = servo.scenario, servo.pinhole
+    key, turning = turning_camera(scenario)
     X_WP = scenario.initial_pose.transform()
     X_CO, aimed = servo.X_CO(X_WP, 0.0), ""
-    if joints is not None:
-        mounting = aimed_mounting(servo.mounting, joints, X_CO)
-        X_CO, aimed = mounting.X_CO(X_WP, servo.motion.at(0.0)), ", aimed by camera.pan_tilt,"
+    if turning is not None:
+        mounting = turning.aimed(servo.mounting, X_CO)
+        X_CO, aimed = mounting.X_CO(X_WP, servo.motion.at(0.0)), f", aimed by {key},"
     if servo.target.in_view(X_CO, pinhole):
         return
     depth = float(X_CO.translation()[2])

@@ -120,11 +120,19 @@ class StoredLog(Mapping[str, Array]):
             self._names = tuple(stored.files)
 
     def __getitem__(self, name: str) -> Array:
-        """All rows of a quantity."""
+        """All rows of a quantity.
+
+        Raises:
+            OutputFolderError: The file is damaged.
+        """
         if name not in self._names:
             raise KeyError(name)
-        with np.load(self._path, allow_pickle=False) as stored:
-            values: Array = stored[name]
+        try:
+            with np.load(self._path, allow_pickle=False) as stored:
+                values: Array = stored[name]
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as problem:
+            words = f"{self._path.parent}: {self._path.name} cannot be read: {problem}"
+            raise OutputFolderError(words) from problem
         return values
 
     def __iter__(self) -> Iterator[str]:
@@ -250,7 +258,6 @@ class Recorder:
 
 
 _WRENCH = ("mx_nm", "my_nm", "mz_nm", "fx_n", "fy_n", "fz_n")
-_JOINTS = ("pan_rad", "tilt_rad")
 _ELLIPSE = (("u", "px"), ("v", "px"), ("n20_", "px2"), ("n11_", "px2"), ("n02_", "px2"))
 _POSE = ("qw", "qx", "qy", "qz", "x_m", "y_m", "z_m")
 _PARTS = {
@@ -259,11 +266,6 @@ _PARTS = {
     "servo_mode": ("image_flag", "switches", "l_pose", "l_image", "pose_bound", "image_bound"),
     "quality": ("deviation_px", "correlation", "share", "points", "followed"),
     "desired_wrench": _WRENCH, "applied_wrench": _WRENCH,
-    "specific_force": ("x_m_s2", "y_m_s2", "z_m_s2"),
-    "angular_velocity": ("x_rad_s", "y_rad_s", "z_rad_s"),
-    "imu_biases": ("ax_m_s2", "ay_m_s2", "az_m_s2", "wx_rad_s", "wy_rad_s", "wz_rad_s"),
-    "pan_tilt_angles": _JOINTS, "pan_tilt_encoders": _JOINTS, "camera_joints": _JOINTS,
-    "camera_encoders": _JOINTS, "turned_found": ("flag",), "wheel_distances": ("left_m", "right_m"),
     "contact_force": ("x_n", "y_n", "z_n"), "contact_count": ("count",),
 }  # fmt: skip
 _PER_CABLE = {
@@ -290,11 +292,9 @@ def column_names(log: Log, names: Mapping[str, Sequence[str] | str]) -> list[str
         known = named.get(quantity, ())
         if isinstance(known, str):
             endings = [f"{cable}_{known}" for cable in names["cables"]]
-        elif quantity.startswith("scan_") or quantity == "depth_row":
-            endings = [f"{k}_m" for k in range(size)]
         elif quantity.startswith("X_"):
             endings = list(_POSE)
-        elif quantity in ("corners_px", "turned_corners_px"):
+        elif quantity.endswith("corners_px"):
             endings = [f"{axis}{k}_px" for k in range(size // 2) for axis in "uv"]
         elif quantity == "ellipses_px":
             endings = [f"{part}{k}_{unit}" for k in (0, 1) for part, unit in _ELLIPSE]

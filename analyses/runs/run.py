@@ -115,6 +115,7 @@ class Run(Result):
         wall_time: Time of the simulation, without building and writing [s].
         folder: Where it was written; None: nowhere.
         failed: Files that could not be written, and why.
+        at_end: What only the diagram knew at its end, for reports of sections, by names.
         stopped: True if somebody stopped it before all its files were written.
         chosen_end: True if the user chose the duration, which then explains a timeout.
     """
@@ -140,6 +141,7 @@ class Run(Result):
         self.outcome, self.message, self.sim_time, self.wall_time = Outcome.RUNNING, "", 0.0, 0.0
         self.folder: Path | None = None
         self.failed: dict[str, str] = {}
+        self.at_end: dict[str, Any] = {}
         self.stopped = self.chosen_end = False
 
     @abstractmethod
@@ -186,7 +188,7 @@ class Run(Result):
         the unit of those that have a number for each cable."""
         names: dict[str, Sequence[str] | str] = {}
         for _, section in sections_of(self.scenario):
-            names |= section.columns
+            names |= section.log_columns()
         return names | {"cables": [cable.name for cable in self.robot.cables]}
 
     def arguments(self) -> dict[str, Any]:
@@ -301,7 +303,7 @@ class Run(Result):
     def read(self, folder: Path) -> bool:
         """Takes log and summary of a run whose files are all written; False if it is none.
 
-        What only an engine knows, as the last image of a depth camera, stays None.
+        What only an engine knows stays None, and `at_end` empty.
         """
         files = [folder / name for name in ("log.npz", "log.csv", "summary.json")]
         if (folder / PARTS).exists() or not all(path.is_file() for path in files):

@@ -28,7 +28,7 @@ from cdpr_drake.analyses.runs.checks import (
 from cdpr_drake.analyses.runs.engine import DiagramEngine, Engine, LoopEngine
 from cdpr_drake.analyses.runs.log import spread
 from cdpr_drake.analyses.runs.run import Run
-from cdpr_drake.analyses.runs.sensing import PAN_TILT, SENSING
+from cdpr_drake.analyses.runs.sensing import SENSING
 from cdpr_drake.analyses.runs.stability import STABILITY, Stability, stability_of_run
 from cdpr_drake.analyses.runs.subjects import (
     BEHAVIOUR,
@@ -63,6 +63,7 @@ from cdpr_drake.systems.monitoring.tension_watch import TensionExtremes
 from cdpr_drake.systems.robots.settings import COMPILED, model_words, simulated_model
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.run_settings import DIAGRAM, engine_of
+from cdpr_drake.systems.sections import sections_of
 from cdpr_drake.vision.target import PointTarget
 
 THESIS_WIDTH = 1600
@@ -113,8 +114,7 @@ class TorqueSteps:
 
 
 SUBJECTS = (
-    MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, FAILURES, PAN_TILT, WORLD,
-    STABILITY,
+    MOTORS, WANTED_TENSIONS, BEHAVIOUR, *SENSING, TENSION_GAIN, FAILURES, WORLD, STABILITY,
 )  # fmt: skip
 """Subjects of runs of visual servos, in the order of their numbers in a summary."""
 
@@ -127,7 +127,6 @@ class ServoRun(Run):
         step_errors: Largest estimated errors of an integration step [m, rad].
         images: Images taken by a camera with a region of interest, and those drawn whole.
         torque: What a servo by torque did.
-        depth_image: The last image of a depth camera, shape (h, w) [m].
         loop: What steps it: compiled or diagram.
 
     Those that a run does not have, or that its log alone does not tell, are None.
@@ -135,7 +134,7 @@ class ServoRun(Run):
 
     kind = VISUAL_SERVO
     subjects = SUBJECTS
-    broken = step_errors = depth_image = None
+    broken = step_errors = None
     images: tuple[int, int] | None = None
     torque: TorqueSteps | None = None
 
@@ -159,7 +158,8 @@ class ServoRun(Run):
 
     def check(self) -> list[str]:
         scenario = self.scenario
-        if scenario.camera.kind == RENDERED or scenario.sensors.depth is not None:
+        renders = any(section.needs_rendering for _, section in sections_of(scenario))
+        if scenario.camera.kind == RENDERED or renders:
             probe_rendering()
         if self.loop == DIAGRAM:
             self.built.make_context()
@@ -219,7 +219,9 @@ class ServoRun(Run):
         if built.watch is not None:
             self.broken = built.watch.broken(built.watch.GetMyContextFromRoot(context))
         self.step_errors = None if diverged else built.step_errors(context)
-        self.images, self.depth_image = built.images(context), built.depth_image(context)
+        self.images = built.images(context)
+        for _, section in sections_of(self.scenario):
+            self.at_end |= section.at_end(built, context)
         if torque is not None and built.tension_range is not None:
             own, watch = torque.GetMyContextFromRoot(context), built.tension_range
             steps, relaxed = torque.steps(own)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.figures import (
     LEGEND_BESIDE,
@@ -20,9 +21,7 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableGeometryError
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.palette import BOUND, DISTANCE, LOST, PLATFORM
-from cdpr_drake.servoing.servo_task import CameraMounting
-from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
-from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_ENCODERS, LOGGED_JOINTS, turned_mounting
+from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.diagrams.servo_models import LoopServo
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of, servo_criterion
 from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
@@ -79,21 +78,20 @@ def run_criterion(run: Run) -> ServoCriterion:
 
 
 def turned_criterion(
-    criterion: ServoCriterion, mounting: CameraMounting, settings: CameraPanTilt, joints: Array
+    criterion: ServoCriterion, rest: RigidTransform, true: RigidTransform, believed: RigidTransform
 ) -> ServoCriterion:
-    """The criterion while a camera's joints are at angles and their encoders read others.
+    """The criterion while a camera is turned, and believed to be turned otherwise.
 
     The servo uses the image that the camera would take at rest, computed with the encoders. A
     camera at rest takes that image if its mounting has the errors of the encoders.
 
     Args:
         criterion: Of the camera at rest.
-        mounting: Mounting of the camera with both angles zero.
-        settings: The joints.
-        joints: True angles, and angles of the encoders, shape (2, 2) [rad].
+        rest: X_BC of the camera at rest [m].
+        true: X_BC where it is [m].
+        believed: X_BC where the encoders have it [m].
     """
-    true, encoders = (turned_mounting(mounting, settings, angles).X_BC for angles in joints)
-    off = mounting.X_BC.inverse() @ true @ encoders.inverse() @ mounting.X_BC
+    off = rest.inverse() @ true @ believed.inverse() @ rest
     sees = criterion.sees
     return replace(
         criterion, camera=criterion.camera @ off,
@@ -111,14 +109,17 @@ def stability_along(run: Run, threshold: float | None = None) -> Stability:
     log, count = run.log, len(run.log["time"])
     rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
     slack = log["slack"][rows] > 0.0 if threshold is None else log["tensions"][rows] < threshold
-    criterion, turns = run_criterion(run), run.scenario.camera.pan_tilt
+    criterion, rest, (_, turning) = (
+        run_criterion(run), run.built.mounting, turning_camera(run.scenario)
+    )  # fmt: skip
+    if turning is not None:
+        turned, believed = (turning.mountings(rest, log, rows, known) for known in (False, True))
     times, true, estimated = (log[name][rows] for name in ("time", "X_WP", "X_WP_estimated"))
     rank, margin = np.zeros(len(rows)), np.full(len(rows), np.nan)
     for k, time in enumerate(times):
         current = criterion
-        if turns is not None:
-            joints = np.array([log[name][rows[k]] for name in (LOGGED_JOINTS, LOGGED_ENCODERS)])
-            current = turned_criterion(criterion, run.built.mounting, turns, joints)
+        if turning is not None:
+            current = turned_criterion(criterion, rest.X_BC, turned[k].X_BC, believed[k].X_BC)
         poses = pose_from_row(true[k]), pose_from_row(estimated[k])
         try:
             rank[k], margin[k] = current.at(*poses, ~slack[k], float(time))

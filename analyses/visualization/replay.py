@@ -44,8 +44,8 @@ from cdpr_drake.models.robot_holding import rest_as_long
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.diagrams.camera import pictured_robot
-from cdpr_drake.systems.diagrams.pan_tilt import LOGGED_JOINTS, turned_mounting
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
 from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -284,7 +284,8 @@ def write_replay(
         title: Of the page; empty: the scenario's.
     """
     curves, images = tension_curves(log, limits or robot.tension_limits()), film_images(view)
-    times, joints = log["time"], None if scenario is None else scenario.camera.pan_tilt
+    times = log["time"]
+    _, turning = ("", None) if scenario is None else turning_camera(scenario)
 
     def scene() -> RobotPicture:
         full_scale = float(np.max(log["tensions"]))
@@ -309,7 +310,9 @@ def write_replay(
         # A log on disk is read once, and only what is shown.
         poses, tensions = log["X_WP"][shown], log["tensions"][shown]
         unstrained = log["unstrained_lengths"][shown] if "unstrained_lengths" in log else None
-        angles = None if joints is None else log[LOGGED_JOINTS][shown]
+        mountings = [] if camera is None else [camera[0]] * len(shown)
+        if camera is not None and turning is not None:
+            mountings = [*turning.mountings(camera[0], log, shown)]
         slack = np.zeros(tensions.shape, bool)
         mover = ThingMover(picture.meshcat, around.things, log, shown)
         picture.start_recording()
@@ -320,10 +323,7 @@ def write_replay(
             mover.place(frame, time)
             slack[frame] = picture.cables.slack(tensions[frame], lengths)
             if camera is not None:
-                mounting = camera[0]
-                if joints is not None and angles is not None:
-                    mounting = turned_mounting(mounting, joints, angles[frame])
-                picture.place_camera(mounting.X_WC(X_WP), time)
+                picture.place_camera(mountings[frame].X_WC(X_WP), time)
         html = picture.html(
             frames=frame_signals(log, shown, slack), curves=curves,
             camera=None if view is None else camera_signals(view, log, shown, images),

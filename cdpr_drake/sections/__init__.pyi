@@ -11,6 +11,16 @@ from .emergency.reaction import EmergencyReaction as EmergencyReaction
 from .emergency.section import EmergencySettings as EmergencySettings
 from .force_control.section import ForceControl as ForceControl
 from .force_control.section import ForceTracking as ForceTracking
+from .pan_tilt.section import CameraPanTilt as CameraPanTilt
+from .perception.depth_sensor import DepthSensor as DepthSensor
+from .perception.head import PanTilt as PanTilt
+from .perception.range_sensor import RangeSensor as RangeSensor
+from .perception.section import DepthSettings as DepthSettings
+from .perception.section import OdometrySettings as OdometrySettings
+from .perception.section import PanTiltSettings as PanTiltSettings
+from .perception.section import RangeSettings as RangeSettings
+from .perception.wheel_odometry import WheelModel as WheelModel
+from .perception.wheel_odometry import WheelOdometry as WheelOdometry
 from .pose_plan.section import PlannedPoseServo as PlannedPoseServo
 from .pose_plan.section import PosePlanSettings as PosePlanSettings
 from .predictive.section import PredictiveDistributor as PredictiveDistributor

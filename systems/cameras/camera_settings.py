@@ -8,7 +8,7 @@ from cdpr_drake.errors import RobotFileError
 from cdpr_drake.models.camera_catalogue import CameraFault, Distortion, fold_refusals, load_camera
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import FASTEST, In, OneOf, Refusal, Scope, Text, settings, told
-from cdpr_drake.systems.cameras.pan_tilt_settings import CameraPanTilt
+from cdpr_drake.systems.sections import with_sections
 from cdpr_drake.vision.image_flaws import ImageFlaws
 from cdpr_drake.vision.pinhole import Pinhole
 
@@ -48,6 +48,7 @@ class FlawSettings:
 
 
 @settings
+@with_sections("camera")
 class CameraSettings:
     """The camera that looks at the target."""
 
@@ -98,10 +99,6 @@ class CameraSettings:
     fault: Annotated[CameraFault | None, "When it fails; null: never; projected camera only."] = (
         None
     )
-    pan_tilt: Annotated[
-        CameraPanTilt | None,
-        "Two joints that turn it and keep the target in view; null: it is fixed.",
-    ] = None
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """What a camera of its kind cannot do, and one that is none."""
@@ -122,10 +119,6 @@ class CameraSettings:
         if self.fault is not None and self.kind != PROJECTED:
             found = f"a fault with camera.kind {self.kind}"
             yield "fault", found, f"null, or camera.kind {PROJECTED}"
-        moves = self.flaws is not None and self.flaws.flaws().moves
-        if self.pan_tilt is not None and moves:
-            found = "images that take time with camera.pan_tilt"
-            yield "flaws", found, "exposure and readout 0"
         if self.mount not in [mount.name for mount in scope.robot.cameras] or (
             self.distortion is not None and any(self.distortion.refusals(scope))
         ):

@@ -15,7 +15,7 @@ from cdpr_drake.systems.estimators.sensor_fusion import SensorFusion
 from cdpr_drake.systems.robots.assembly import RobotBlock
 from cdpr_drake.systems.scenarios.visual_servo_scenario import VisualServoSettings
 from cdpr_drake.systems.sensors.depth_at_points import DepthAtPoints
-from cdpr_drake.systems.sensors.perception_sensors import add_imu
+from cdpr_drake.systems.sensors.sensor_settings import add_imu
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import PointTarget
 

@@ -22,7 +22,6 @@ from cdpr_drake.systems.cameras.camera_settings import REGION, WHOLE
 from cdpr_drake.systems.diagrams.beliefs import read_camera
 from cdpr_drake.systems.diagrams.controller import make_tasks, scheme_refusals
 from cdpr_drake.systems.diagrams.fusion_checks import fusion_refusals
-from cdpr_drake.systems.diagrams.pan_tilt import pan_tilt_refusals
 from cdpr_drake.systems.diagrams.tension_management import management_refusals
 from cdpr_drake.systems.diagrams.torque_control import (
     torque_refusals,
@@ -250,7 +249,6 @@ def _world(scope: Scope) -> Iterator[Refusal]:
 SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     _mount,
     _believed_camera,
-    pan_tilt_refusals,
     _poses,
     _tasks,
     _perturbations,

@@ -9,6 +9,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator, 
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
+from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.tension_corrector import TensionCorrector
 from cdpr_drake.systems.controllers.torque_controller import TorqueController
@@ -16,11 +17,6 @@ from cdpr_drake.systems.diagrams.beliefs import winch_offsets
 from cdpr_drake.systems.diagrams.camera import add_camera, add_target
 from cdpr_drake.systems.diagrams.estimators import EstimatorInputs, add_estimator
 from cdpr_drake.systems.diagrams.fusion_models import steers
-from cdpr_drake.systems.diagrams.pan_tilt import (
-    TurningCamera,
-    add_camera_joints,
-    add_centring,
-)
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.diagrams.tension_management import add_tension_corrector
 from cdpr_drake.systems.diagrams.torque_control import (
@@ -42,6 +38,8 @@ class VisualServoBlocks(ServoModel):
     Attributes:
         block: The robot that it moves.
         measurement: The camera, with the ports of `TargetMeasurement`.
+        sight: What shows the target as a camera at its mounting has it: the camera, or the view of
+            one that turns; with the outputs X_CO, found and marks.
         servo: The servo.
         estimator: The estimator that the servo listens to.
         compared: Estimators that run beside it.
@@ -50,13 +48,13 @@ class VisualServoBlocks(ServoModel):
             None for others.
         corrector: Takes up slack; None unless asked for.
         torque: Makes torques of the servo's twist; None unless winches are commanded by torque.
-        turning: The joints of a camera that turns, and what turns them; None: it is fixed.
         prefix: What the names of the blocks begin with.
         logged: What sections log, by the names of the quantities.
     """
 
     block: RobotBlock
     measurement: TargetMeasurement
+    sight: System
     servo: FeatureServo
     estimator: System
     compared: tuple[System, ...]
@@ -64,15 +62,8 @@ class VisualServoBlocks(ServoModel):
     wanted_lengths: Integrator | None
     corrector: TensionCorrector | None = None
     torque: TorqueController | None = None
-    turning: TurningCamera | None = None
     prefix: str = ""
     logged: dict[str, OutputPort] = field(default_factory=dict)
-
-    @property
-    def sight(self) -> System:
-        """What shows the target as a camera at its mounting has it: the camera, or the steady view
-        of one that turns; with the outputs X_CO, found and marks."""
-        return self.measurement if self.turning is None else self.turning.view
 
     def take_lengths(self, context: Context, lengths: Array) -> None:
         """Starts what integrates wanted lengths at lengths, shape (m,) [m], in the root context."""
@@ -115,12 +106,6 @@ def add_visual_servo(
             X_WO = robot.GetOutputPort("X_WO")
         elif robot.scene_graph is not None:
             X_WO = add_target(builder, robot.scene_graph, settings.target, name=prefix + "target")
-    joints = None
-    if settings.camera.pan_tilt is not None:
-        joints = add_camera_joints(
-            builder, settings.camera.pan_tilt, model.mounting, seed=settings.seed,
-            name=prefix + "camera_joints",
-        )  # fmt: skip
     measurement = add_camera(
         builder,
         robot,
@@ -133,20 +118,15 @@ def add_visual_servo(
         image_bias=settings.perturbations.image_bias,
         name=name,
     )
-    turning = None
-    if joints is not None:
-        camera = builder.GetMutableSubsystemByName(prefix + "camera")
-        builder.Connect(joints.GetOutputPort("X_BH"), camera.GetInputPort("X_BC"))
-        turning = add_centring(
-            builder, settings.camera, joints, measurement, mounting=model.mounting,
-            pinhole=pinhole, prefix=prefix,
-        )  # fmt: skip
-    looking = measurement if turning is None else turning.view
+    _, turning = turning_camera(settings)
+    sight: System = measurement
+    if turning is not None:
+        sight = turning.add_view(builder, model, measurement, settings, prefix)
     servo = model.make_servo(settings)
     builder.AddNamedSystem(prefix + "servo", servo)
     task = model.estimator_task(settings)
     readings = SensorReadings(builder, robot, settings.sensors, seed=settings.seed, name=name)
-    ports = {port: looking.GetOutputPort(port) for port in ("X_CO", "found")}
+    ports = {port: sight.GetOutputPort(port) for port in ("X_CO", "found")}
     ports["platform_velocity"] = servo.GetOutputPort("platform_velocity")
     torque = add_torque_controller(
         builder, settings, robot, believed=model.believed, name=prefix + "torque_controller"
@@ -164,8 +144,7 @@ def add_visual_servo(
         name=name,
     )
     estimator, *compared = _add_estimators(builder, settings.estimator, task, inputs, prefix)
-    sight = seen_ports(settings, looking, estimator, target.mark)
-    for port, source in sight.items():
+    for port, source in seen_ports(settings, sight, estimator, target.mark).items():
         builder.Connect(source, servo.GetInputPort(port))
     builder.Connect(estimator.GetOutputPort("X_WP"), servo.GetInputPort("X_WP"))
     for port in ("tensions", "lengths"):
@@ -184,6 +163,7 @@ def add_visual_servo(
         **{each.name: getattr(model, each.name) for each in fields(model)},
         block=robot,
         measurement=measurement,
+        sight=sight,
         servo=servo,
         estimator=estimator,
         compared=tuple(compared),
@@ -191,7 +171,6 @@ def add_visual_servo(
         wanted_lengths=_command_winches(builder, velocities, robot, prefix),
         corrector=corrector,
         torque=torque,
-        turning=turning,
         prefix=prefix,
     )
     sections = [section for _, section in sections_of(settings)]
@@ -209,14 +188,14 @@ def add_visual_servo(
 
 
 def seen_ports(
-    settings: VisualServoSettings, looking: System, estimator: System, mark: str
+    settings: VisualServoSettings, sight: System, estimator: System, mark: str
 ) -> dict[str, OutputPort]:
     """What shows a servo its target, by the names of its inputs: what looks at it, see
     `VisualServoBlocks.sight`, or the estimator where that fuses cameras and steers."""
     if steers(settings):
         names = {"X_CO": "X_CO_fused", "found": "fused_found", mark: "fused_marks"}
         return {name: estimator.GetOutputPort(port) for name, port in names.items()}
-    return {name: looking.GetOutputPort(name) for name in ("X_CO", "found", mark)}
+    return {name: sight.GetOutputPort(name) for name in ("X_CO", "found", mark)}
 
 
 def _add_estimators(

@@ -10,6 +10,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.pose_features import seen_pose_error
 from cdpr_drake.servoing.servo_task import BelievedRobot, CameraMounting
+from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopServo, open_loop_plan
 from cdpr_drake.systems.diagrams.beliefs import (
@@ -174,7 +175,7 @@ def servo_model(
     mounting = CameraMounting(
         mount.pose.transform(),
         motion.at(0.0) if on_platform else None,
-        settings.camera.pan_tilt is not None,
+        turning_camera(settings)[1] is not None,
     )
     last_task = settings.tasks()[-1]
     X_CdO = last_task.desired.transform()

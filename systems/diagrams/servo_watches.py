@@ -10,7 +10,6 @@ from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.systems.cameras.camera_settings import RENDERED
 from cdpr_drake.systems.diagrams.fusion_readings import fusion_ports
-from cdpr_drake.systems.diagrams.pan_tilt import turning_ports
 from cdpr_drake.systems.diagrams.servo_blocks import VisualServoBlocks, seen_ports
 from cdpr_drake.systems.diagrams.servo_models import ServoModel
 from cdpr_drake.systems.diagrams.torque_control import tension_limits
@@ -20,7 +19,6 @@ from cdpr_drake.systems.monitoring.servo_criterion import ServoCriterion
 from cdpr_drake.systems.monitoring.tension_watch import BreakingLoadWatch, TensionRange
 from cdpr_drake.systems.robots.failures import FAULTS
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors
 from cdpr_drake.systems.sensors.sensor_kinds import SENSORS
 from cdpr_drake.systems.worlds.adding import (
     CONTACT_RESULTS,
@@ -170,7 +168,6 @@ def add_servo_log(
     builder: DiagramBuilder,
     scenario: Scenario,
     blocks: VisualServoBlocks,
-    looking: PerceptionSensors,
     meters: WorldMeters | None,
 ) -> RunLog:
     """Logs what the summary, the figures and the replay need."""
@@ -185,8 +182,6 @@ def add_servo_log(
     }
     if blocks.target.quality and scenario.camera.kind == RENDERED:
         ports["quality"] = blocks.measurement.GetOutputPort("quality")
-    if blocks.turning is not None:
-        ports |= turning_ports(blocks.turning, blocks.measurement)
     for name in servo.logged():
         ports[name] = servo.GetOutputPort(name)
     for name in LOGGED_OF_CABLES:
@@ -212,5 +207,5 @@ def add_servo_log(
         if block.HasOutputPort(name):  # motors on the winches
             ports[name] = block.GetOutputPort(name)
     ports |= fusion_ports((blocks.estimator, *blocks.compared))
-    ports |= looking.logged | blocks.logged
+    ports |= blocks.logged
     return add_log(builder, ports, scenario.log_rate)

@@ -34,7 +34,8 @@ from cdpr_drake.systems.robots.failures import LATE
 from cdpr_drake.systems.robots.settings import COMPILED
 from cdpr_drake.systems.scenarios.files import VISUAL_SERVO
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
-from cdpr_drake.systems.sensors.perception_sensors import PerceptionSensors, add_perception_sensors
+from cdpr_drake.systems.sections import sections_of
+from cdpr_drake.systems.sensors.sensor_readings import check_rate
 from cdpr_drake.systems.worlds.adding import WorldInScene, WorldMeters
 from cdpr_drake.systems.worlds.contact import contact_law, contact_step
 
@@ -55,7 +56,6 @@ class VisualServo(VisualServoBlocks):
         monitor: The block that ends the run.
         log: What the run stores.
         max_step: Integration step [s].
-        looking: Sensors that look at the world and at motion, those that there are.
         watch: Watches for broken cables; None where no breaking load is known.
         tension_range: Watches how far tensions go, where torques are commanded; else None.
         world: What is round the robot; None: nothing.
@@ -67,7 +67,6 @@ class VisualServo(VisualServoBlocks):
     monitor: RunMonitor
     log: RunLog
     max_step: float
-    looking: PerceptionSensors
     watch: BreakingLoadWatch | None = None
     tension_range: TensionRange | None = None
     world: WorldInScene | None = None
@@ -105,11 +104,6 @@ class VisualServo(VisualServoBlocks):
         if not isinstance(camera, RegionCamera):
             return None
         return camera.images(camera.GetMyContextFromRoot(context))
-
-    def depth_image(self, context: Context) -> Array | None:
-        """The last image of a depth camera, shape (h, w) [m], from the root context, or None."""
-        sensor = self.looking.depth
-        return None if sensor is None else sensor.image(sensor.GetMyContextFromRoot(context))
 
     def make_context(self) -> Context:
         """A root context with the platform at rest at the initial pose, slack paid out if asked.
@@ -150,19 +144,23 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
     builder.AddNamedSystem("robot", block)
     blocks = add_visual_servo(builder, block, scenario)
     watches = add_servo_watches(builder, scenario, blocks, world)
-    looking = add_perception_sensors(
-        builder, block, scenario.sensors, seed=scenario.seed, motion=blocks.motion
-    )
-    log = add_servo_log(builder, scenario, blocks, looking, watches.meters)
+    log = add_servo_log(builder, scenario, blocks, watches.meters)
     for event in () if scenario.failures is None else scenario.failures.of_sensors():
         assert event.sensor is not None
         late = event.delay if event.kind == LATE else None
         blocks.readings.fail(event.sensor, event.begins, event.cable, late)
+    rates = {
+        f"{key}.rate": rate
+        for key, section in sections_of(scenario)
+        if (rate := section.sampling_rate()) is not None
+    }
     max_step = integration_step(scenario, blocks)
     if scenario.integration.max_step is None:
-        max_step = min(max_step, blocks.readings.shortest_period(), scenario.sensors.own_period())
+        periods = [blocks.readings.shortest_period(), *(1.0 / rate for rate in rates.values())]
+        max_step = min(max_step, *periods)
     blocks.readings.check_step(max_step)
-    scenario.sensors.check_step(max_step)
+    for key, rate in rates.items():
+        check_rate(key, rate, max_step)
     if isinstance(block, CompiledCableRobot):
         integration = scenario.integration
         block.integrate_by(
@@ -188,7 +186,6 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
         monitor=watches.monitor,
         watch=watches.breaking,
         tension_range=watches.tensions,
-        looking=looking,
         world=world,
         meters=watches.meters,
         log=log,

@@ -60,10 +60,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its engine is the plant"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
-    if scenario.camera.pan_tilt is not None:
-        return "its camera turns on two joints, which are blocks of a diagram"
-    if scenario.sensors.looks_round():
-        return "its sensors look at a scene"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
     if scenario.tension_management is not None and scenario.tension_management.kind == IMAGE:

@@ -110,7 +110,7 @@ class ServoLoop:
                 self.max_step, *(1.0 / rate for rate in self._rates.values()), np.inf
             )
         for sensor, rate in self._rates.items():
-            check_rate(sensor, rate, self.max_step)
+            check_rate(f"sensors.{sensor}_rate", rate, self.max_step)
         integration = scenario.integration
         self._motion = RobotMotion(
             robot,

@@ -2,10 +2,11 @@
 
 * Of the robot: tensions, motor encoders, poses from outside. `SENSORS` is their table. Readings
   carry bias, noise, resolution and rate of a type of the catalogue, repeatable by a seed.
-* Of the world and of motion: laser scanners and beams, an inertial measurement unit, a depth
-  camera, a head on two joints, odometry of the mobile robot. `add_perception_sensors` adds those of
-  a scenario's section `sensors`. Each has its own rate and its own stream of random numbers,
-  repeatable by a seed.
+* Of motion: an inertial measurement unit, which an estimator that fuses sensors reads.
+* Sections of `sensors`, such as laser scanners, look at the world and are logged:
+  `cdpr_drake.sections`. `add_perception_sensors` adds them to a robot without a servo.
+
+Each has its own rate and its own stream of random numbers, repeatable by a seed.
 
 Cameras are in `systems.cameras`. Frames: S of a sensor (x ahead, y to the left), C of a camera (z
 ahead, y down), H of a head, B of what carries it.

@@ -5,5 +5,3 @@ from .scene_shapes import SceneShapes as SceneShapes
 from .sensor_kinds import SENSORS as SENSORS
 from .sensor_kinds import SensorSettings as SensorSettings
 from .sensor_settings import SensorSuite as SensorSuite
-from .wheel_odometry import WheelModel as WheelModel
-from .wheel_odometry import WheelOdometry as WheelOdometry

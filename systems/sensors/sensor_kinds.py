@@ -4,6 +4,7 @@
 section `sensors` that chooses their types.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -21,6 +22,7 @@ from cdpr_drake.models.sensor_catalogue import (
     tension_sensor_names,
 )
 from cdpr_drake.schema.declarations import In, OneOf, Refusal, Scope, filled, repeated, settings
+from cdpr_drake.systems.sections import Section
 from cdpr_drake.systems.sensors.motor_encoders import MotorEncoders
 from cdpr_drake.systems.sensors.pose_sensor import PoseSensor
 from cdpr_drake.systems.sensors.tension_sensor import TensionSensor
@@ -170,3 +172,30 @@ class SensorSettings:
         """The most readings per second that the type of one of `SENSORS` makes [Hz], or None."""
         kind = self.kind(sensor)
         return None if kind == IDEAL else float(SENSORS[sensor].load(kind).rate_hz)
+
+
+class TypedSensor(Section):
+    """Base of sections for a sensor of a type of the catalogue, with fields `type` and `rate`."""
+
+    type: str
+    rate: float | None
+
+    @staticmethod
+    @abstractmethod
+    def load(name: str) -> Any:
+        """The type of a name, which has `rate_hz`, the most readings per second [Hz]."""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """A rate beyond that of the type."""
+        largest = self.load(self.type).rate_hz
+        if self.rate is not None and self.rate > largest:
+            yield "rate", f"{self.rate:g}", f"at most {largest:g} [Hz], that of {self.type}"
+
+    def model(self) -> Any:
+        """The type, with the rate that is set here."""
+        model = self.load(self.type)
+        return model if self.rate is None else replace(model, rate_hz=self.rate)
+
+    def sampling_rate(self) -> float:
+        """Readings per second [Hz]."""
+        return float(self.model().rate_hz)

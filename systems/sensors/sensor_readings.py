@@ -21,18 +21,15 @@ def make_sensor(sensor: str, settings: SensorSettings, robot: Robot, seed: int) 
     return kind.make(settings.model(sensor), robot, seed, rate)
 
 
-def check_rate(sensor: str, rate: float, max_step: float) -> None:
-    """Refuses a sensor that reads, at a rate [Hz], more often than the simulation steps [s].
-
-    `sensor` is one of `SENSORS`, or a field of the section that ends in .rate.
+def check_rate(key: str, rate: float, max_step: float) -> None:
+    """Refuses a sensor that reads, at the rate of a key [Hz], more often than steps are taken [s].
 
     Raises:
-        ScenarioError: Names the sensor, its rate and the largest one.
+        ScenarioError: Names the key, its rate and the largest one.
     """
-    field = sensor if sensor.endswith(".rate") else f"{sensor}_rate"
     if rate * max_step > 1.0:
         raise ScenarioError(
-            f"sensors.{field}: found {rate:g}; accepted: at most {1.0 / max_step:g} "
+            f"{key}: found {rate:g}; accepted: at most {1.0 / max_step:g} "
             f"[Hz], one reading per step of integration.max_step = {max_step:g} s"
         )
 
@@ -87,7 +84,7 @@ class SensorReadings:
             ScenarioError: Names the sensor, its rate and the largest one.
         """
         for sensor, rate in self._added():
-            check_rate(sensor, rate, max_step)
+            check_rate(f"sensors.{sensor}_rate", rate, max_step)
 
     def fail(self, sensor: str, begins: float, cable: int | None, late: float | None) -> None:
         """Has one of `SENSORS` fail from a time on.

@@ -58,7 +58,7 @@ that it is set down on ground which is level with the frame [m]."""
 GROUND = "ground"
 """Name of the ground among the bodies of the world."""
 
-TAKEN = ("world", "platform", "target", "pan_tilt")
+TAKEN = ("world", "platform", "target")
 """Names by which sensors are put on something else."""
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.geometry.poses import pose_from_angles
+from cdpr_drake.sections.perception.head import head_pose
 from cdpr_drake.servoing.feature_plan import PROFILES, FeaturePlan
 from cdpr_drake.servoing.target_motion import MotionFilter, feature_drift
 from cdpr_drake.servoing.turned_view import (
@@ -17,7 +18,6 @@ from cdpr_drake.servoing.turned_view import (
     spiral,
     steady_view,
 )
-from cdpr_drake.systems.sensors.pan_tilt import head_pose
 from tests.servoing.servo_cases import PERIOD
 
 ROUND_OFF = 1e-12

@@ -10,7 +10,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.runs import servo_figures, subjects
-from cdpr_drake.analyses.runs.sensing import SENSING, pan_tilt_numbers, reading_figure
+from cdpr_drake.analyses.runs.sensing import SENSING, reading_figure
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.calibration.identifiability import FRAMES
 from cdpr_drake.geometry.cable_paths import cable_paths
@@ -30,22 +30,19 @@ from cdpr_drake.sections.adaptation.report import (
     doubts,
     true_offsets,
 )
-from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.pan_tilt import (
-    LOGGED_ENCODERS,
-    LOGGED_FOUND,
-    LOGGED_IMAGE,
-    LOGGED_JOINTS,
-)
-from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
-from cdpr_drake.systems.sensors.sensor_settings import (
+from cdpr_drake.sections.pan_tilt.report import pan_tilt_numbers
+from cdpr_drake.sections.pan_tilt.section import ENCODERS, IMAGE, JOINTS
+from cdpr_drake.sections.pan_tilt.section import FOUND as TURNED_FOUND
+from cdpr_drake.sections.perception import report as perception
+from cdpr_drake.sections.perception.section import (
     DepthSettings,
-    InertialSettings,
     OdometrySettings,
     PanTiltSettings,
     RangeSettings,
-    SensorSuite,
 )
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.sensors.sensor_kinds import SensorSettings
+from cdpr_drake.systems.sensors.sensor_settings import InertialSettings, SensorSuite
 from cdpr_drake.trajectories.pose_trajectory import SteadyMotion
 from tests.analyses.runs.run_by_hand import (
     ESTIMATE_OFF,
@@ -240,9 +237,9 @@ def looking(rows, value, image):
     log["X_WO_odometry"] = np.tile([1.0, 0, 0, 0, 0.1, 0.2, 0.3], (rows, 1))
     motion = SteadyMotion(RigidTransform(), np.zeros(3), np.zeros(3))
     return drawn_of(by_hand(
-        log, depth_image=image, built=SimpleNamespace(motion=motion),
+        log, at_end={"depth_image": image}, built=SimpleNamespace(motion=motion),
         scenario=SimpleNamespace(sensors=SUITE),
-    ), *SENSING)  # fmt: skip
+    ), *SENSING, *perception.SUBJECTS)  # fmt: skip
 
 
 @pytest.mark.parametrize(("rows", "value"), [(1, np.inf), (700, 1.5), (3, -np.inf)])
@@ -278,9 +275,9 @@ def test_numbers_of_a_camera_on_joints_are_those_of_the_log():
     off = np.radians([[0.3, 0.0], [-0.3, 0.2], [0.3, 0.0], [-0.3, 0.2]])
     seen = [[0.0, 0.0], [303.0, 204.0], [0.0, 0.0], [300.0, 212.0]]
     log = {
-        "time": np.array([0.0, 1.0, 2.0, 4.0]), LOGGED_JOINTS: joints,
-        LOGGED_ENCODERS: joints + off, LOGGED_FOUND: np.array([[0.0], [1.0], [0.0], [1.0]]),
-        LOGGED_IMAGE: np.tile(seen, (1, 4)) + np.array([1.0, 2, -1, 2, -1, -2, 1, -2]),
+        "time": np.array([0.0, 1.0, 2.0, 4.0]), JOINTS: joints,
+        ENCODERS: joints + off, TURNED_FOUND: np.array([[0.0], [1.0], [0.0], [1.0]]),
+        IMAGE: np.tile(seen, (1, 4)) + np.array([1.0, 2, -1, 2, -1, -2, 1, -2]),
     }  # fmt: skip
     limits = {"lower_deg": [-30.0, -30.0], "upper_deg": [30.0, 30.0], "counts_per_turn": 4096}
     run = by_hand(
@@ -294,7 +291,7 @@ def test_numbers_of_a_camera_on_joints_are_those_of_the_log():
         "at_limits_s": 3.0, "encoder_error_deg": [0.3, 0.2 / np.sqrt(2.0)],
     }  # fmt: skip
     assert numbers == {key: pytest.approx(value) for key, value in expected.items()}
-    log[LOGGED_FOUND] = np.zeros((4, 1))
+    log[TURNED_FOUND] = np.zeros((4, 1))
     blind = pan_tilt_numbers(run)
     assert [blind[key] for key in ("first_seen_s", "unseen_after_s")] == [None, None]
 

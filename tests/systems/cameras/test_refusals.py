@@ -23,7 +23,7 @@ REFUSED = [
     (PAN_TILT, ["stability={}"], "stability: found a section with camera.pan_tilt"),
     (PAN_TILT, [RENDERED, "camera.flaws={exposure: 0.01}"],
      "camera.flaws: found images that take time"),
-    (PAN_TILT, ["integration.loop=compiled"], "camera turns on two joints"),
+    (PAN_TILT, ["integration.loop=compiled"], "its section camera.pan_tilt adds blocks"),
     (PBVS, [f"camera.distortion={BARREL}"], "camera.distortion: found a brown"),
     (PBVS, ["camera.distortion={kind: fisheye, k6: 1}"],
      "camera.distortion.k6: found 1 with kind"),

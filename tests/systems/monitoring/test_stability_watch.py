@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analyses.frame.folder import Folder, read_marker
 from cdpr_drake.analyses.runs.along import assess_run
+from cdpr_drake.analyses.runs.log import StoredLog
 from cdpr_drake.analyses.runs.servo import ServoRun
 from cdpr_drake.analyses.runs.stability import (
     Stability,
@@ -23,7 +24,6 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.sections.stability.section import StabilityWatch
 from cdpr_drake.systems.diagrams.load import load_scenario
-from cdpr_drake.systems.diagrams.pan_tilt import turned_mounting
 from cdpr_drake.systems.diagrams.servo_watches import criterion_of
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from tests.messages import printed
@@ -178,6 +178,16 @@ def test_a_log_that_lacks_something_is_refused(tmp_path):
         assess_run(along=tmp_path)
 
 
+def test_a_quantity_of_a_log_that_is_damaged_is_named_by_its_file(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, time=np.arange(300.0))
+    log, content = StoredLog(path), bytearray(path.read_bytes())
+    content[1000] ^= 255  # an array's numbers, of which the file has a sum
+    path.write_bytes(content)
+    with pytest.raises(OutputFolderError, match=r"log\.npz cannot be read: Bad CRC"):
+        log["time"]
+
+
 def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     """As a camera at rest whose mounting is off by that turn; nothing, where they are right."""
     scenario = load_scenario("acrobot_pan_tilt", ["integration.engine=compiled"])
@@ -186,8 +196,15 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     at = servo.block.robot.home.transform()
 
     def turned(degrees):
-        joints = np.radians(degrees)
-        return turned_criterion(criterion, servo.mounting, scenario.camera.pan_tilt, joints)
+        joints, encoders = np.radians(degrees)
+        log, rest = (
+            {"camera_joints": joints[None], "camera_encoders": encoders[None]},
+            servo.mounting,
+        )
+        (true,), (believed,) = (
+            scenario.camera.pan_tilt.mountings(rest, log, [0], known) for known in (False, True)
+        )
+        return turned_criterion(criterion, rest.X_BC, true.X_BC, believed.X_BC)
 
     def margin(criterion):
         return criterion.at(at, at, np.ones(8, bool), 0.0)[1]
@@ -197,7 +214,7 @@ def test_joints_of_a_camera_count_by_the_errors_of_their_encoders():
     wrong = turned([[20.0, 0.0], [0.0, 0.0]])
     off = criterion.camera.inverse() @ wrong.camera
     assert np.degrees(off.rotation().ToAngleAxis().angle()) == pytest.approx(20.0)
-    true = turned_mounting(servo.mounting, scenario.camera.pan_tilt, np.radians([20.0, 0.0]))
+    true = scenario.camera.pan_tilt.turned(servo.mounting, np.radians([20.0, 0.0]))
     assert true.X_BC.IsNearlyEqualTo(servo.mounting.X_BC @ off, 1e-12)
     assert margin(wrong) < 0.99 * margin(criterion)
     seen = wrong.camera @ wrong.sees(at, 0.0)

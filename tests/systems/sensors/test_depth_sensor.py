@@ -12,7 +12,7 @@ from pydrake.systems.sensors import ImageDepth32F
 
 from cdpr_drake.models.rendered_camera import add_renderer, make_depth_camera
 from cdpr_drake.models.sensor_catalogue import load_depth_sensor
-from cdpr_drake.systems.sensors.depth_sensor import (
+from cdpr_drake.sections.perception.depth_sensor import (
     DepthSensor,
     binned,
     depth_pinhole,

@@ -11,9 +11,9 @@ from pydrake.systems.framework import BasicVector, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.errors import SensorError
+from cdpr_drake.sections.perception.head import PanTilt, PanTiltJoints, head_pose
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.projected_camera import ProjectedCamera
-from cdpr_drake.systems.sensors.pan_tilt import PanTilt, PanTiltJoints, head_pose
 from cdpr_drake.vision.dots import DotTarget
 from cdpr_drake.vision.pinhole import Pinhole
 

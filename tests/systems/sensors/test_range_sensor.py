@@ -10,8 +10,8 @@ from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.errors import SensorError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.sensor_catalogue import RangeSensorModel, load_range_sensor
+from cdpr_drake.sections.perception.range_sensor import RangeSensor
 from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
-from cdpr_drake.systems.sensors.range_sensor import RangeSensor
 from tests.systems.sensors.scenes import scene_of
 
 EXACT = 1e-9

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 import yaml
 from pydrake.geometry import Box, Role
-from pydrake.systems.analysis import InitializeParams
+from pydrake.systems.analysis import InitializeParams, Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource
 
 from cdpr_drake.analyses.runs.engine import fixed_step_simulator
 from cdpr_drake.analyses.runs.servo import ServoRun
@@ -19,6 +21,8 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.monitoring.context_state import has_arrays_only, restore_state, state_arrays
+from cdpr_drake.systems.robots.compiled_cable_robot import CompiledCableRobot
+from cdpr_drake.systems.sensors import add_perception_sensors
 from tests.messages import printed
 
 ENGINE = "integration.engine=compiled"
@@ -137,6 +141,9 @@ REFUSED = [
      "depth.carrier: found hose, which is not there; accepted"),
     (LOOKING, "target.motion=null",
      "sensors.odometry: found a target that no mobile robot carries"),
+    (LOOKING, "world={obstacles: [{name: pan_tilt, kind: sphere, radius: 0.1, pose: {position: "
+     "[9, 9, 9]}}]}",
+     "world.obstacles[0].name: found pan_tilt"),
     (LOOKING, "sensors.range_sensors=[{name: a, type: hokuyu}]", "hokuyu"),
     (LOOKING, "sensors.depth.binning=0", "binning"),
     ("caroca_world", "sensors.range_sensors=[{name: a, carrier: barrier_a}]",
@@ -168,7 +175,8 @@ def test_readings_oftener_than_steps_are_refused():
 
 
 def test_a_loop_without_a_diagram_leaves_sensors_of_a_scene_to_a_diagram():
-    assert diagram_reason(load_scenario(LOOKING, NO_DEPTH)) == "its sensors look at a scene"
+    reason = diagram_reason(load_scenario(LOOKING, NO_DEPTH))
+    assert reason == "its section sensors.imu adds blocks to a diagram"
 
 
 def test_odometry_is_right_at_the_start_and_drifts(looking):
@@ -188,7 +196,7 @@ def test_each_sensor_has_its_own_rate(looking):
 def test_each_sensor_has_a_figure(looking):
     drawn = {"scan_front", "scan_beam", "imu", "depth", "pan_tilt", "odometry"}
     assert drawn <= set(looking.figures())
-    assert looking.depth_image.shape == (120, 160)
+    assert looking.at_end["depth_image"].shape == (120, 160)
     without = ServoRun(load_scenario("acrobot_moving_tag", SHORT))
     without.log = looking.log
     assert "imu" not in without.figures()
@@ -198,7 +206,7 @@ def test_a_beam_on_the_head_ends_where_the_head_says():
     """Its end, by the head's angles, is on the surface of one of the frame's boxes."""
     servo = servo_of(LOOKING, *NO_DEPTH)
     context = servo.make_context()
-    head, beam = servo.looking.pan_tilt, servo.looking.ranges["beam"]
+    head, beam = (servo.diagram.GetSubsystemByName(name) for name in ("pan_tilt", "scan_beam"))
     X_HS = servo.scenario.sensors.range_sensors[1].pose.transform()
     scene = servo.block.scene_graph
     query = scene.get_query_output_port().Eval(scene.GetMyContextFromRoot(context))
@@ -223,13 +231,44 @@ def test_a_beam_on_the_head_ends_where_the_head_says():
     assert met > 0
 
 
+def test_a_robot_without_a_servo_reads_the_same():
+    """By the same blocks and the same random numbers, under names of its own."""
+    servo = servo_of(LOOKING, *NO_DEPTH, "target.motion=null", "sensors.odometry=null")
+    builder, scenario = DiagramBuilder(), servo.scenario
+    robot = builder.AddNamedSystem("robot", CompiledCableRobot(servo.robot, scenario))
+    still = builder.AddSystem(ConstantVectorSource(np.zeros(len(servo.robot.cables))))
+    builder.Connect(still.get_output_port(), robot.GetInputPort("cable_velocities"))
+    ports = add_perception_sensors(builder, robot, scenario.sensors, seed=scenario.seed, name="r")
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    pose = scenario.initial_pose.transform()
+    robot.set_at_equilibrium(robot.GetMyMutableContextFromRoot(context), pose)
+    Simulator(diagram, context).AdvanceTo(0.0)
+    whole = servo.make_context()
+    Simulator(servo.diagram, whole).AdvanceTo(0.0)
+    assert set(ports) == {
+        "specific_force", "angular_velocity", "imu_biases", "pan_tilt_angles", "pan_tilt_encoders",
+        "scan_front", "scan_beam",
+    }  # fmt: skip
+    for name in ("pan_tilt_encoders", "imu_biases", "angular_velocity", "scan_beam"):
+        block = {"pan": "pan_tilt", "scan": "scan_beam"}.get(name.split("_")[0], "imu")
+        system = servo.diagram.GetSubsystemByName(block)
+        port = system.GetOutputPort(ports[name].get_name())
+        own = ports[name].get_system()
+        assert own.get_name() == f"r_{block}"
+        np.testing.assert_allclose(
+            ports[name].Eval(own.GetMyContextFromRoot(context)),
+            port.Eval(system.GetMyContextFromRoot(whole)), atol=SAME_FRAMES,
+        )  # fmt: skip
+
+
 def test_a_moving_target_can_carry_a_sensor():
     """A beam on the mobile robot looks up at the platform: that is as high as the log says."""
     pose = "{position: [0.06, 0, 0], angles_deg: [0, -90, 0]}"
     up = f"sensors.range_sensors=[{{name: up, type: beam, carrier: target, pose: {pose}}}]"
     servo = servo_of(LOOKING, *NO_DEPTH, up)
     context = servo.make_context()
-    beam = servo.looking.ranges["up"]
+    beam = servo.diagram.GetSubsystemByName("scan_up")
     (found,) = beam.truth(beam.GetMyContextFromRoot(context))
     bottom = servo.true_pose(context).translation()[2]  # P is in the middle of the bottom face
     height = servo.motion.at(0.0).translation()[2]
@@ -252,7 +291,7 @@ def test_beams_of_a_scanner_on_the_hose_end_on_the_ground_and_never_below(hose, 
     context.SetTime(time)
     own, start = hose.block.GetMyMutableContextFromRoot(context), hose.scenario.initial_pose
     hose.block.set_at_equilibrium(own, start.transform())
-    sensor = hose.looking.ranges["hokuyo"]
+    sensor = hose.diagram.GetSubsystemByName("scan_hokuyo")
     found = sensor.truth(sensor.GetMyContextFromRoot(context))
     carrier = next(body for body in hose.scenario.world.obstacles if body.name == "hose")
     X_WS = carrier.path().at(time) @ hose.scenario.sensors.range_sensors[0].pose.transform()

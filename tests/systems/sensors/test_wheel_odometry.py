@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 
 from cdpr_drake.geometry.poses import pose_error
-from cdpr_drake.systems.sensors.wheel_odometry import WheelModel, WheelOdometry, arc_end
+from cdpr_drake.sections.perception.wheel_odometry import WheelModel, WheelOdometry, arc_end
 from cdpr_drake.trajectories.mobile_robot import MobileRobotMotion, RoundedTrack
 
 TRACK = RoundedTrack(length=0.26, width=0.16, corner_radius=0.05)

@@ -222,7 +222,7 @@ def test_the_world_of_the_gazebo_thesis_stands_where_it_says(gazebo):
 
 def test_the_hokuyo_on_the_hose_looks_down_on_the_ground(gazebo):
     """At the start its plane stands upright, and its middle beam looks straight down."""
-    sensor, context = gazebo.looking.ranges["hokuyo"], gazebo.make_context()
+    sensor, context = gazebo.diagram.GetSubsystemByName("scan_hokuyo"), gazebo.make_context()
     own = sensor.GetMyContextFromRoot(context)
     X_BS = gazebo.scenario.sensors.range_sensors[0].pose.transform()
     X_WS = gazebo.world.world.body("hose").motion.at(0.0) @ X_BS

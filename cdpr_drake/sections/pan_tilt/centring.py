@@ -23,7 +23,7 @@ class CentringLaw(LeafSystem):
     found          vector(1)   -     in, 1 while the turned camera sees the target
     corners        vector(2 n) px    in, its marks
     encoder_angles vector(2)   rad   in, pan and tilt as their encoders read them
-    joint_rates    vector(2)   rad/s out, for `systems.sensors.pan_tilt.PanTilt` by velocity
+    joint_rates    vector(2)   rad/s out, for a `PanTilt` by velocity
     ============== =========== ===== ==========================================================
 
     Discrete updates at the rate of the images. What goes to the middle of the image is the mean of
