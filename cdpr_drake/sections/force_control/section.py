@@ -71,7 +71,7 @@ TOUCHES = 0.2
 class ForceControl(Section):
     """How the platform answers forces, in the place of plain computed torque."""
 
-    words = "How the platform answers forces, by the engine plant, beside computed torque"
+    words = "How the platform answers forces, by the engine plant, in the place of computed torque"
     columns: ClassVar = {
         ESTIMATED: PARTS,
         DISPLACEMENT: ("rx_rad", "ry_rad", "rz_rad", "x_m", "y_m", "z_m"),
