@@ -17,7 +17,7 @@ REFUSED = [
     (PAN_TILT, ["camera.pan_tilt.start_deg=[0, 76]"], "camera.pan_tilt.start_deg: found (0, 76)"),
     (PAN_TILT, ["camera.pan_tilt.gain=0"], "camera.pan_tilt.gain"),
     (PAN_TILT, ["target.kind=circles", "controller.scheme=circles"], "target.kind: found circles"),
-    (PAN_TILT, ["estimator.kind=fusion"], "overrides estimator.kind: found fusion with camera.pan_tilt"),
+    (PAN_TILT, ["estimator.kind=fusion"], "overrides estimator.kind: found fusion with camera"),
     (PAN_TILT, ["estimator.compare=[fusion]"], "estimator.compare[0]: found fusion"),
     (PAN_TILT, ["adaptation={}"], "overrides adaptation: found a section with camera.pan_tilt"),
     (PAN_TILT, ["stability={}"], "overrides stability: found a section with camera.pan_tilt"),
