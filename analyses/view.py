@@ -19,7 +19,7 @@ from cdpr_drake.analyses.visualization.mechanism_replay import MechanismScene, m
 from cdpr_drake.analyses.visualization.meshcat_window import LOCAL, open_meshcat, page_address
 from cdpr_drake.analyses.visualization.replay import RobotPicture, robot_picture
 from cdpr_drake.errors import OutputFolderError, plain_words, why_not_read
-from cdpr_drake.models.mechanism_loader import as_robot_or_mechanism
+from cdpr_drake.models.mechanism_loader import load_robot_or_mechanism
 from cdpr_drake.models.mechanism_schema import Mechanism
 
 PAGES = (".html", ".htm")
@@ -88,7 +88,7 @@ def view(
             "found with html; accepted: without html, as a page needs no server",
             host=host, port=port,
         )  # fmt: skip
-    loaded = as_robot_or_mechanism(robot)
+    loaded = load_robot_or_mechanism(robot)
     if html is not None:
         _check_page(html)
     meshcat = open_meshcat(host or LOCAL, port) if html is None else open_meshcat()

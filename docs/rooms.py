@@ -39,7 +39,7 @@ LIBRARY = ("cdpr_drake", "#ffffff")
 TOLERANCE = 0.05
 """Of numbers of lines, as a share; those up to two thousand lines may be off by a hundred."""
 
-WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 120, 26, 6, 6.9
+WIDTH, LEFT, HEIGHT, GAP, LETTER = 640, 130, 26, 6, 6.9
 
 
 @cache
@@ -133,9 +133,18 @@ def label(module: str) -> str:
 
 
 def picture() -> str:
-    """The layers as SVG: a row each, boxes coloured by folder."""
-    parts, y, shown = [], GAP, None
+    """The layers as SVG: a row each, boxes coloured by folder, a line between wings and core."""
+    parts, y, shown, above = [], GAP, None, ""
     for layer in layers():
+        if above and not wing_of(layer[0]):
+            parts.append(
+                f'<line x1="0" y1="{y + GAP}" x2="{WIDTH}" y2="{y + GAP}" stroke="#555555" '
+                f'stroke-dasharray="6 4"/>'
+                f'<text x="{WIDTH - GAP}" y="{y - 2}" text-anchor="end">wings</text>'
+                f'<text x="{WIDTH - GAP}" y="{y + 24}" text-anchor="end">core</text>'
+            )
+            y += 2 * GAP
+        above = wing_of(layer[0])
         labels = [(label(module), folder_of(module)) for module in layer]
         x, rows = LEFT, 1
         if labels[0][1] != shown:

@@ -3,8 +3,8 @@
 * Files: a robot is a folder of `robots/` with a YAML file and a README of provenance; `load_robot`
   reads it. Poses in files are position [m] and angles (phi, theta, psi) in degrees, R = Rx Ry Rz.
 * Schema: `Robot` is a robot file; `Robot.cable_set()` gives all constants of its cables. Sections
-  of it are what a robot is built of beside its points: materials, pulleys, shapes, rails, winches.
-  What follows from several sections together stands beside them.
+  of it are what a robot has in addition to its points: materials, pulleys, shapes, rails, winches.
+  Refusals of several sections together are in `robot_refusals`.
 * Cameras and sensors are catalogues of what manufacturers publish.
 * Plant: `add_robot` puts a platform into anybody's plant.
 

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 import numpy as np
 
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.cable_behaviour import CableBehaviour
 from cdpr_drake.schema.declarations import (
     LONGEST,
     Direction,
@@ -25,7 +24,7 @@ from cdpr_drake.schema.declarations import (
 
 @settings
 class BehaviourSettings:
-    """What cables and their sheaves do beside the elastic law; see `cables.cable_behaviour`."""
+    """Effects of cables and sheaves beyond the elastic law; see `cables.cable_behaviour`."""
 
     stiffening: Annotated[
         float,
@@ -33,7 +32,7 @@ class BehaviourSettings:
         "Growth of the tangent stiffness per tension: E S (1 + g t).",
     ] = 0.0
     expansion: Annotated[
-        float, In("1/K", ge=-0.001, le=0.001), "Of unstrained lengths with temperature."
+        float, In("1/K", ge=-0.001, le=0.001), "Expansion of unstrained lengths with temperature."
     ] = 0.0
     warmer: Annotated[
         float, In("K", ge=-200.0, le=200.0), "Temperature above that at which lengths are counted."
@@ -52,22 +51,14 @@ class BehaviourSettings:
     creep_stiffness: Annotated[
         float,
         In("-", ge=0.0, le=10.0),
-        "Of the part that creeps away under load, over E S; only cables in motion show it.",
+        "Stiffness of the spring that creeps under load, over E S; only cables in motion show it.",
     ] = 0.0
-    creep_time: Annotated[float, In("s", ge=0.001, le=10000000.0), "In which it creeps away."] = 1.0
-
-    def behaviour(self) -> CableBehaviour:
-        """These numbers as the laws take them."""
-        return CableBehaviour(
-            stiffening=self.stiffening, expansion=self.expansion, warmer=self.warmer,
-            sheave_friction=self.sheave_friction, sliding_speed=self.sliding_speed,
-            creep_stiffness=self.creep_stiffness, creep_time=self.creep_time,
-        )  # fmt: skip
+    creep_time: Annotated[float, In("s", ge=0.001, le=10000000.0), "Creep time constant."] = 1.0
 
 
 @settings
 class CableMaterial:
-    """What the cables are made of; a cable's own `material` goes before it, key by key."""
+    """Material of the cables; a cable's own `material` overrides it, key by key."""
 
     youngs_modulus: Annotated[float, In("Pa", gt=0.0, le=1e13), "Young's modulus."]
     diameter: Annotated[float, In("m", gt=0.0, le=1.0), "Diameter."]
@@ -92,7 +83,7 @@ class CableMaterial:
 
 @settings
 class OwnMaterial:
-    """What one cable is made of where that differs from the section `cable` of its robot."""
+    """Material of one cable where it differs from the section `cable` of its robot."""
 
     youngs_modulus: Annotated[float | None, In("Pa", gt=0.0, le=1e13), "Young's modulus."] = None
     diameter: Annotated[float | None, In("m", gt=0.0, le=1.0), "Diameter."] = None
@@ -132,9 +123,9 @@ class Pulley:
     arm: Annotated[
         float,
         In("m", ge=0.0),
-        "Length of arms in the place of pulleys, across the swivel axis, about which they"
-        " swivel: cables begin at their ends. Of a platform that does not turn, arms at "
-        "its anchor points are the same.",
+        "Length of arms instead of pulleys, across the swivel axis about which they swivel: "
+        "cables begin at their ends. Arms at the anchor points of a platform that does not turn "
+        "are the same.",
     ] = 0.0
 
 
@@ -157,7 +148,7 @@ class Rail:
     axis: Annotated[Direction, "Direction in W in which the coordinate grows; of any length."]
     lower: Annotated[float, In("m"), "Smallest coordinate."]
     upper: Annotated[float, In("m"), "Largest coordinate."]
-    at: Annotated[float, In("m"), "Coordinate, counted from `exit_point`."] = 0.0
+    at: Annotated[float, In("m"), "Coordinate of the exit point, from `exit_point`."] = 0.0
 
     def shift(self) -> Array:
         """From `exit_point` to where the cable leaves, shape (3,) [m]."""
@@ -189,7 +180,7 @@ class Cable:
     )
     winch: Annotated[
         Text | None,
-        "Name of its winch; cables with the same one are wound on one. Null: one of its own.",
+        "Name of its winch; cables with the same name share one. Null: a winch of its own.",
     ] = None
     anchor_swivel_axis: Annotated[
         Direction | None,
@@ -203,7 +194,7 @@ class Cable:
     ] = None
     material: Annotated[
         OwnMaterial | None,
-        "What it is made of where that differs from `cable`; null: nothing differs.",
+        "Its material where that differs from `cable`; null: nothing differs.",
     ] = None
     drum_radius: Annotated[
         float | None, In("m", gt=0.0), "Radius of its drum; null: that of `winch`."
@@ -211,8 +202,8 @@ class Cable:
     mechanical_advantage: Annotated[
         float,
         In("-", ge=1.0),
-        "Parts of line side by side between exit and anchor point, a block and tackle: "
-        "line that its drum winds over length of the cable. The material is that of all "
+        "Mechanical advantage of a block and tackle: parallel parts of line between exit and "
+        "anchor point, so line on its drum over length of the cable. The material is that of all "
         "parts together; rated speeds are of cables with 1.",
     ] = 1.0
 

@@ -97,7 +97,7 @@ class Camera:
         float, In("deg", gt=0.0, lt=180.0), "Full view angle along the height."
     ]
     rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest frame rate."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
     principal_point: Annotated[
         np.ndarray | None,
         In("px", 2),

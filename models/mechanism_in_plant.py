@@ -155,7 +155,7 @@ def add_mechanism(plant: MultibodyPlant, mechanism: Mechanism, name: str = "") -
 
 
 def absolute_directives(file: Path, folder: Path | None = None) -> str:
-    """Model directives with URIs in the place of paths relative to their file.
+    """Model directives with URIs instead of paths relative to their file.
 
     Drake takes URIs alone there; what else is wrong it says itself. `folder` is where Drake finds
     what the file names beside itself; None: where the file is.

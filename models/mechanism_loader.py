@@ -62,7 +62,7 @@ def parse_mechanism(content: str, path: Path) -> Mechanism:
 
     Args:
         content: YAML.
-        path: The file that messages name, and beside which others are looked for.
+        path: The file that messages name; further files are searched in its folder.
 
     Raises:
         RobotFileError: As `load_mechanism`.
@@ -76,13 +76,19 @@ def parse_mechanism(content: str, path: Path) -> Mechanism:
     )  # fmt: skip
 
 
-def load_robot_or_mechanism(name: str | Path) -> Robot | Mechanism:
-    """A robot with one platform, or a mechanism, by name or path.
+def load_robot_or_mechanism(robot: Robot | Mechanism | str | Path) -> Robot | Mechanism:
+    """A robot with one platform, or a mechanism, that is given as itself, or by name or path.
 
     Raises:
-        RobotFileError: As `load_robot` or `load_mechanism`.
+        RobotFileError: As `load_robot` or `load_mechanism`, or it is something else.
     """
-    return load_mechanism(name) if is_mechanism(robot_file(str(name))) else load_robot(name)
+    if isinstance(robot, Robot | Mechanism):
+        return robot
+    if isinstance(robot, str | Path):
+        return load_mechanism(robot) if is_mechanism(robot_file(str(robot))) else load_robot(robot)
+    raise RobotFileError(
+        f"robot: found a {type(robot).__name__}; accepted: a name, a path, a Robot or a Mechanism"
+    )
 
 
 def as_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
@@ -97,21 +103,6 @@ def as_mechanism(mechanism: Mechanism | str | Path) -> Mechanism:
         return load_mechanism(mechanism)
     raise RobotFileError(
         f"mechanism: found a {type(mechanism).__name__}; accepted: a name, a path or a Mechanism"
-    )
-
-
-def as_robot_or_mechanism(robot: Robot | Mechanism | str | Path) -> Robot | Mechanism:
-    """As `load_robot_or_mechanism`, where it may be given as itself.
-
-    Raises:
-        RobotFileError: As `load_robot_or_mechanism`, or it is something else.
-    """
-    if isinstance(robot, Robot | Mechanism):
-        return robot
-    if isinstance(robot, str | Path):
-        return load_robot_or_mechanism(robot)
-    raise RobotFileError(
-        f"robot: found a {type(robot).__name__}; accepted: a name, a path, a Robot or a Mechanism"
     )
 
 

@@ -90,7 +90,7 @@ class MechanismCable:
     ] = None
     material: Annotated[
         OwnMaterial | None,
-        "What it is made of where that differs from `cable`; null: nothing differs.",
+        "Its material where that differs from `cable`; null: nothing differs.",
     ] = None
 
     def route(self) -> list[tuple[str, str, Array]]:
@@ -121,7 +121,7 @@ class Mechanism(Summarized):
     """A plant of Drake with cables between its frames."""
 
     name: Annotated[Name, "Name, the same as that of its folder."]
-    title: Annotated[Text, "What it is, in one line."] = ""
+    title: Annotated[Text, "Title in one line."] = ""
     mechanism: Annotated[
         Text,
         "File of its bodies and joints: Drake's model directives, URDF, SDFormat or MJCF;"
@@ -129,17 +129,17 @@ class Mechanism(Summarized):
     ]
     packages: Annotated[
         dict[str, Text],
-        "Folders of packages by name, relative to this file, for package:// beside those "
-        "with a package.xml beside or above this file.",
+        "Folders of packages by name, relative to this file, in addition to "
+        "those with a package.xml in its folder or above.",
     ] = filled(dict)
     gravity: Annotated[
         float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
     ] = 9.81
-    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+    gravity_direction: Annotated[Direction, "Direction of gravity in W, of any length."] = values(
         0.0, 0.0, -1.0
     )
     cable: Annotated[
-        CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
+        CableMaterial, "Material of the cables; a cable's own `material` overrides it."
     ]
     pulley: Annotated[
         EndPulley | None, "Pulleys at the exit points; null: the cables leave from fixed points."
@@ -151,11 +151,11 @@ class Mechanism(Summarized):
     home: Annotated[
         MechanismHome, "Positions to start from; what it does not name is as `mechanism` says."
     ] = filled(MechanismHome)
-    cables: Annotated[list[MechanismCable], "The cables, in the order of all vectors of m."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    cables: Annotated[list[MechanismCable], "The m cables; all vectors of cables have this order."]
+    assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """What no mechanism is; what Drake refuses of its bodies is told when they are read."""
+        """Cables, names and files that no mechanism has; Drake refuses bodies as it reads them."""
         if not self.cables:
             yield "cables", "none", "at least one cable"
         yield from repeated((cable.name for cable in self.cables), "cables[{}].name")
@@ -170,7 +170,7 @@ class Mechanism(Summarized):
             yield "mechanism", self.mechanism, "a file that is there"
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         low, high = self.tension_limits()
         eyelets = sum(len(cable.via) for cable in self.cables)
         frames = sorted({where for cable in self.cables for _, where, _ in cable.route()})
@@ -182,7 +182,7 @@ class Mechanism(Summarized):
         ]
 
     def materials(self) -> list[CableMaterial]:
-        """What each cable is made of, m of them."""
+        """Materials of the m cables."""
         return [own_material(self.cable, cable.material) for cable in self.cables]
 
     def stiffness(self) -> Array:

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    BodyIndex,
-    JointActuatorIndex,
-    JointIndex,
-)
+from pydrake.multibody.tree import BodyIndex, JointActuatorIndex, JointIndex
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CableModelError

@@ -39,7 +39,7 @@ def plant_tension_problem(
     Args:
         cables: The cables of the plant.
         context: Of the plant.
-        force: Generalized force beside gravity and the plant's force elements, tau_a, shape (nv,)
+        force: Generalized force without gravity and the plant's force elements, tau_a, shape (nv,)
             [N, N m]; None: none.
         limits: Smallest and largest tensions, shape (m,) or one for all [N].
         held: Joints that motors hold, by name; None: those with actuators in the plant.

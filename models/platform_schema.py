@@ -28,15 +28,18 @@ TRIANGLE_ROUNDING = 1e-15
 
 @settings
 class HysteresisSettings:
-    """Friction against turns of the platform, in what it hangs on; see
-    `dynamics.contact_hysteresis`."""
+    """Friction against turns of the platform; see `dynamics.contact_hysteresis`."""
 
     tilt: Annotated[
         float,
         In("N m/rad", ge=0.0, le=1000000.0),
         "Stiffness of contacts that stick, about x and y of P.",
     ] = 0.0
-    turn: Annotated[float, In("N m/rad", ge=0.0, le=1000000.0), "The same about z of P."] = 0.0
+    turn: Annotated[
+        float,
+        In("N m/rad", ge=0.0, le=1000000.0),
+        "Stiffness of contacts that stick, about z of P.",
+    ] = 0.0
     slip: Annotated[
         float,
         In("rad", ge=0.0001, le=10.0),
@@ -67,7 +70,7 @@ class Platform:
     center_of_mass: Annotated[
         np.ndarray | None,
         In("m", 3),
-        "Centre of mass in P; null: the middle of the box, of a point mass Po.",
+        "Centre of mass in P; null: the middle of the box, or Po of a point mass.",
     ] = None
     inertia: Annotated[
         np.ndarray | None,
@@ -77,18 +80,17 @@ class Platform:
     ] = None
     shape: Annotated[
         PlatformShape | None,
-        "Its shape, drawn in the place of the box, in which it lies; null: the box.",
+        "Visual shape within the box, drawn instead of it; null: the box.",
     ] = None
     inertia_of: Annotated[
         str,
         OneOf((BOX_INERTIA, SHAPE_INERTIA)),
-        "What a homogeneous body of its mass has of an inertia that is not given, and of "
-        "a centre of mass that is not.",
+        "Homogeneous body that gives inertia and centre of mass where they are not given.",
     ] = BOX_INERTIA
     hysteresis: Annotated[
         HysteresisSettings | None,
-        "Friction against its turns, by Dahl, in knots, joints, ropes that bend and wires"
-        " that hang on it; null: none.",
+        "Dahl friction against its turns, in knots, joints, bending ropes and hanging wires; "
+        "null: none.",
     ] = None
 
     def middle(self) -> Array:
@@ -105,13 +107,16 @@ class Platform:
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
+    def has_possible_inertia(self) -> bool:
+        """True if a body of positive mass can have these moments of inertia."""
+        least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
+        return bool(least > 0.0 and least + middle >= most * (1.0 - TRIANGLE_ROUNDING))
+
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
         """Moments of inertia that no body has, and a shape that reaches out of the box."""
-        if self.inertia is not None:
-            least, middle, most = np.linalg.eigvalsh(self.rotational_inertia())
-            if least <= 0.0 or least + middle < most * (1.0 - TRIANGLE_ROUNDING):
-                accepted = "positive principal moments, none larger than the sum of the other two"
-                yield "inertia", number_words(self.inertia), accepted
+        if self.inertia is not None and not self.has_possible_inertia():
+            accepted = "positive principal moments, none larger than the sum of the other two"
+            yield "inertia", number_words(self.inertia), accepted
         is_of_shape = self.inertia_of == SHAPE_INERTIA
         if self.shape is None and is_of_shape:
             yield "inertia_of", "shape", "box, or a section platform.shape"

@@ -20,7 +20,7 @@ _UPRIGHT = 1e-12
 
 
 def portable_robot(robot: Robot) -> tuple[Robot, list[Path]]:
-    """A robot whose file can lie in another folder, and the files to lie beside it: of its mesh,
+    """A robot whose file can lie in another folder, and the files that go with it: of its mesh,
     and of its cameras, but for one of the same name as another."""
     shape = robot.platform.shape
     own: dict[str, str] = {}

@@ -36,11 +36,11 @@ class Fitted(Protocol):
 
     @property
     def names(self) -> Sequence[str]:
-        """Of the parameters."""
+        """Names of the parameters."""
 
     @property
     def covariance(self) -> Array:
-        """Of them, shape (f, f)."""
+        """Covariance of the parameters, shape (f, f), in SI units."""
 
 
 @dataclass(frozen=True)

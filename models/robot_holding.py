@@ -21,6 +21,7 @@ from cdpr_drake.models.robot_statics import (
     tension_problem,
     wrench_balance,
 )
+from cdpr_drake.schema.declarations import number_words
 from cdpr_drake.statics.controlled_wrenches import combination_words
 from cdpr_drake.statics.equilibrium import equilibrium_near
 from cdpr_drake.statics.static_tensions import (
@@ -62,11 +63,11 @@ def hold_robot(robot: Robot, X_WP: RigidTransform, cables: CableSet, model: str)
             if CABLE_MODELS[model].sags
             else ""
         )
-        position = ", ".join(f"{x:g}" for x in X_WP.translation())
         if robot.is_underactuated():
             raise InfeasibleTensionError(_underactuated(robot, X_WP, cables))
+        at = number_words(X_WP.translation())
         raise InfeasibleTensionError(
-            f"{robot.name} cannot hold the platform at ({position}) m: no tensions within "
+            f"{robot.name} cannot hold the platform at {at} m: no tensions within "
             f"{bounds[0]:g}..{bounds[1]:g} N balance its weight"
             f"{own_weight or missed_by(robot, X_WP, cables)}"
         )
@@ -97,7 +98,6 @@ def lengths_at_home(robot: Robot) -> tuple[Array, str]:
 
 def _underactuated(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
     """Why cables, fewer than degrees of freedom, do not hold a pose."""
-    position = ", ".join(f"{x:g}" for x in X_WP.translation())
     control = wrench_balance(robot, X_WP, cables=cables).control()
     low, high = robot.tension_limits()
     why = f"no tensions within {low:g}..{high:g} N balance its weight"
@@ -110,8 +110,8 @@ def _underactuated(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> str:
         why = f"nothing balances {what}, {control.unbalanced[worst]:.3g} here"
     return (
         f"{robot.name}, {len(robot.cables)} cables for {robot.motion_type().freedom} degrees of "
-        f"freedom, does not rest at ({position}) m: {why}; accepted: a pose of rest, which cable "
-        "lengths have"
+        f"freedom, does not rest at {number_words(X_WP.translation())} m: {why}; accepted: a pose "
+        "of rest, which cable lengths have"
     )
 
 
@@ -197,7 +197,7 @@ def check_pulleys(robot: Robot, X_WP: RigidTransform, cables: CableSet) -> None:
         if outside < radius or (radius == 0.0 and outside == 0.0):
             raise CableGeometryError(
                 f"cable {i + 1} of {robot.name}: its pulley of radius {radius:g} m at "
-                f"({', '.join(f'{x:g}' for x in cables.p_WA[:, i])}) m reaches into the platform; "
+                f"{number_words(cables.p_WA[:, i])} m reaches into the platform; "
                 "accepted: a pose with all pulleys outside of it"
             )
 
@@ -220,12 +220,11 @@ def check_bundles(robot: Robot, cables: CableSet, X_WP: RigidTransform) -> None:
     for i, first in enumerate(groups.leaders()):
         if abs(paid[i] - paid[first]) > TRIMMED * lengths[first]:
             names = robot.cables[first].name, robot.cables[i].name
-            position = ", ".join(f"{x:g}" for x in X_WP.translation())
             raise CableGeometryError(
                 f"{names[0]} and {names[1]} of {robot.name} are on one winch, which pays out the "
                 f"same of both; found {paid[first]:.4g} m and {paid[i]:.4g} m from home to the "
-                f"pose at ({position}) m; accepted: a pose where they differ by less than "
-                f"{TRIMMED:.0%} of the length"
+                f"pose at {number_words(X_WP.translation())} m; accepted: a pose where they differ "
+                f"by less than {TRIMMED:.0%} of the length"
             )
 
 

@@ -133,7 +133,7 @@ def carried_bodies(in_plant: RobotInPlant) -> tuple[str, ...]:
 
 
 def pose_from_state(robot: Robot, state: Any) -> Any:
-    """As `pose_on_joint`, of a robot; who asks often makes the joint once."""
+    """As `pose_on_joint`, of a robot; repeated callers make the joint once."""
     return pose_on_joint(robot.joint(), state)
 
 

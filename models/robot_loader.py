@@ -57,8 +57,8 @@ def robot_file(name: str) -> Path:
     """The file of a robot: a name of `robot_names()`, or the path of a file or folder.
 
     Coordinates of exit points on rails may follow, as in `name@C1=0.3`; they do not change it. A
-    folder has a `robot.yaml`, or is a CASPR model; files of other tools are told by their
-    endings, `ROBOT_SUFFIXES`. It may be that of a mechanism, which `load_mechanism` reads.
+    folder has a `robot.yaml`, or is a CASPR model; files of other tools are recognised by
+    their endings, `ROBOT_SUFFIXES`. It may be that of a mechanism, which `load_mechanism` reads.
 
     Raises:
         RobotFileError: There is no such robot; says which exist.

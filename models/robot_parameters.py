@@ -38,9 +38,6 @@ changes of single winches change it by their mean."""
 ALL = "all"
 """Owner of what all cables or winches share."""
 
-ROUNDING = 1e-15
-"""By how much moments of inertia may miss the triangle inequality, of the largest."""
-
 
 def belongs_to_a_log(name: str) -> bool:
     """Whether a parameter is one of a log, not of the robot's motion."""
@@ -159,7 +156,7 @@ def impossible_parameter(robot: Robot) -> str:
     platform, friction = robot.platform, robot.winch.friction
     below: list[tuple[str, Callable[[], bool]]] = [
         ("mass", lambda: not platform.mass > 0.0),
-        ("inertia", lambda: platform.inertia is not None and not _is_inertia(platform.inertia)),
+        ("inertia", lambda: not platform.has_possible_inertia()),
     ]
     if friction is not None:
         below += [
@@ -180,9 +177,3 @@ def impossible_parameter(robot: Robot) -> str:
         if cable.drum_radius is not None and not cable.drum_radius > 0.0:
             return f"{cable.name}.drum_radius"
     return ""
-
-
-def _is_inertia(six: Any) -> bool:
-    xx, yy, zz, xy, xz, yz = six
-    moments = np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-    return bool(moments[0] > 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - ROUNDING))

@@ -1,4 +1,4 @@
-"""What a robot's file may not say as a whole; what single sections refuse stands with them."""
+"""Refusals of a robot as a whole; those of single sections are in their classes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ALIGNED = 1e-9
 
 
 def robot_refusals(robot: Robot) -> Iterator[Refusal]:
-    """What a robot refuses beside its sections."""
+    """What a robot refuses in addition to its sections."""
     yield from repeated((cable.name for cable in robot.cables), "cables[{}].name")
     yield from repeated((mount.name for mount in robot.cameras), "cameras[{}].name")
     slack, m = robot.slack_readings, len(robot.cables)

@@ -1,7 +1,7 @@
 """The schema of a robot file: what a cable robot is, with units and accepted ranges."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -70,7 +70,7 @@ class CameraMount:
 
     name: Annotated[Text, "Name of the mounting, once in a robot."]
     model: Annotated[Text, "Camera of the catalogue, or path of a camera file."]
-    parent: Annotated[str, OneOf(("platform", "world")), "What carries it."] = "platform"
+    parent: Annotated[str, OneOf(("platform", "world")), "Body that carries it."] = "platform"
     pose: Annotated[Pose, "Pose of the camera frame C in the parent, z forward, y down."]
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
@@ -91,7 +91,7 @@ class Robot(Summarized):
     """A cable-driven parallel robot."""
 
     name: Annotated[Name, "Name, the same as that of its folder."]
-    title: Annotated[Text, "What it is, in one line."] = ""
+    title: Annotated[Text, "Title in one line."] = ""
     motion: Annotated[
         str,
         OneOf(MOTION_TYPES),
@@ -100,9 +100,9 @@ class Robot(Summarized):
     ] = "3R3T"
     axis: Annotated[
         Direction | None,
-        "Of 1T the direction of the line in W, of 2T, 2T1R and 1R2T the normal of the "
-        "plane in W, of 2R3T that of the beam in P, of any length; null: z. Line and "
-        "plane go through the home position.",
+        "Axis of the motion type, of any length: direction of the line in W (1T), normal of the "
+        "plane in W (2T, 2T1R, 1R2T), axis of the beam in P (2R3T); null: z. Line and plane go "
+        "through the home position.",
     ] = None
     plane_height: Annotated[
         float | None,
@@ -112,17 +112,17 @@ class Robot(Summarized):
     gravity: Annotated[
         float, In("m/s^2", ge=0.0, le=1e3), "Acceleration along `gravity_direction`."
     ] = 9.81
-    gravity_direction: Annotated[Direction, "Where gravity points in W, of any length."] = values(
+    gravity_direction: Annotated[Direction, "Direction of gravity in W, of any length."] = values(
         0.0, 0.0, -1.0
     )
     platform: Annotated[Platform, "The moving platform."]
     cable: Annotated[
-        CableMaterial, "Material of the cables; the key `material` of a cable goes before it."
+        CableMaterial, "Material of the cables; a cable's own `material` overrides it."
     ]
     cable_model: Annotated[
         str | None,
         OneOf(tuple((name for name, model in CABLE_MODELS.items() if model.extensible))),
-        "How a cable answers to its length, in simulations and at rest; scenarios and "
+        "Law of tension and length of a cable, in simulations and at rest; scenarios and "
         "options override it. Default: straight cables without weight.",
     ] = None
     damping: Annotated[
@@ -138,21 +138,21 @@ class Robot(Summarized):
     tension_bounds: Annotated[TensionBounds, "Accepted tensions."]
     frame: Annotated[Frame, "The frame."]
     home: Annotated[Pose, "A pose well inside the workspace."]
-    cables: Annotated[list[Cable], "The cables, in the order of all vectors of m."]
+    cables: Annotated[list[Cable], "The m cables; all vectors of cables have this order."]
     cameras: Annotated[list[CameraMount], "Camera mountings."] = filled(list)
     slack_readings: Annotated[
         np.ndarray | None,
         In("N", None),
-        "What tension sensors read while the cables are slack; null: zero.",
+        "Readings of the tension sensors while the cables are slack; null: zero.",
     ] = None
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+    assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
 
     def refusals(self, scope: Scope) -> Iterator[Refusal]:
-        """What no robot is."""
+        """Combinations of sections that no robot has."""
         yield from robot_refusals(self)
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         low, high = self.tension_limits()
         radii = sorted({float(radius) for radius in self.cable_set().pulley_radius})
         size, m = numbers(self.platform.size), len(self.cables)
@@ -204,13 +204,13 @@ class Robot(Summarized):
         return np.array([cable.anchor_point for cable in self.cables], float).T
 
     def materials(self) -> list[CableMaterial]:
-        """What each cable is made of, m of them."""
+        """Materials of the m cables."""
         return [own_material(self.cable, cable.material) for cable in self.cables]
 
     def cable_behaviour(self) -> CableBehaviour:
-        """What the cables do beside the elastic law; nothing where the file does not say."""
+        """Effects in addition to the elastic law; none where the file gives no section."""
         settings = self.cable.behaviour
-        return CableBehaviour() if settings is None else settings.behaviour()
+        return CableBehaviour() if settings is None else CableBehaviour(**vars(settings))
 
     def contact_hysteresis(self) -> "ContactHysteresis | None":
         """Friction against turns of the platform; None where the file gives none."""
@@ -219,7 +219,7 @@ class Robot(Summarized):
         return contacts if contacts is not None and contacts.is_there() else None
 
     def diameters(self) -> Array:
-        """Of the cables, shape (m,) [m]."""
+        """Diameters of the cables, shape (m,) [m]."""
         return np.array([material.diameter for material in self.materials()])
 
     def stiffness(self) -> Array:
@@ -227,7 +227,7 @@ class Robot(Summarized):
         return np.array([material.axial_stiffness() for material in self.materials()])
 
     def knows_breaking_loads(self) -> bool:
-        """Whether the file says of any cable when it breaks."""
+        """True if the file gives the breaking load of any cable."""
         return any(material.breaking_load is not None for material in self.materials())
 
     def cable_set(self, pulleys: bool = True) -> CableSet:
@@ -237,15 +237,7 @@ class Robot(Summarized):
             pulleys: True: over the robot's pulleys. False: pulleys are ignored, and cables run
                 from fixed exit points to fixed anchor points.
         """
-        axes = [
-            self.pulley.swivel_axis if cable.swivel_axis is None else cable.swivel_axis
-            for cable in self.cables
-        ]
         common = self.platform_pulley or PlatformPulley(radius=0.0)
-        anchor_axes = [
-            common.swivel_axis if cable.anchor_swivel_axis is None else cable.anchor_swivel_axis
-            for cable in self.cables
-        ]
         materials = self.materials()
         loads = [material.breaking_load for material in materials]
         cables = CableSet.make(
@@ -253,29 +245,22 @@ class Robot(Summarized):
             self.anchor_points(),
             self.stiffness(),
             retardation=np.array([material.retardation_time for material in materials]),
-            pulley_radius=np.array(
-                [
-                    self.pulley.radius if cable.pulley_radius is None else cable.pulley_radius
-                    for cable in self.cables
-                ]
-            ),
+            pulley_radius=np.array(self._each("pulley_radius", self.pulley.radius)),
             linear_weight=np.array([each.linear_density * self.gravity for each in materials]),
-            swivel_axis=_unit_columns(axes),
+            swivel_axis=_unit_columns(self._each("swivel_axis", self.pulley.swivel_axis)),
             arm=self.pulley.arm,
             breaking_load=np.array([np.inf if load is None else load for load in loads]),
             down=self.down(),
         ).over_platform_pulleys(
-            np.array(
-                [
-                    common.radius
-                    if cable.anchor_pulley_radius is None
-                    else cable.anchor_pulley_radius
-                    for cable in self.cables
-                ]
-            ),
-            _unit_columns(anchor_axes),
+            np.array(self._each("anchor_pulley_radius", common.radius)),
+            _unit_columns(self._each("anchor_swivel_axis", common.swivel_axis)),
         )
         return cables if pulleys else cables.without_pulleys()
+
+    def _each(self, name: str, common: Any) -> list[Any]:
+        """A value of each cable: its own, or the common one where it has none."""
+        own = [getattr(cable, name) for cable in self.cables]
+        return [common if value is None else value for value in own]
 
     def geometry_words(self, pulleys: bool = True) -> str:
         """Geometry of a result in words: "with pulleys of 20 mm", "pulleys ignored", ...
@@ -325,7 +310,7 @@ class Robot(Summarized):
         return law
 
     def winch_groups(self) -> "WinchGroups":
-        """Which cables are on which winch."""
+        """The winch of each cable."""
         from cdpr_drake.winches.groups import WinchGroups
 
         return WinchGroups.of_names([cable.winch for cable in self.cables])
@@ -339,26 +324,24 @@ class Robot(Summarized):
     def _own_drums(self) -> tuple[Array | None, Array | None]:
         """Radii of the drums [m] and mechanical advantages, shape (m,); None where all are the
         winch's, and 1."""
-        radii = [cable.drum_radius for cable in self.cables]
+        own = any(cable.drum_radius is not None for cable in self.cables)
         advantages = np.array([cable.mechanical_advantage for cable in self.cables])
-        common = self.winch.drum_radius
-        own = np.array([common if radius is None else radius for radius in radii])
         return (
-            None if all(radius is None for radius in radii) else own,
+            np.array(self._each("drum_radius", self.winch.drum_radius)) if own else None,
             None if np.all(advantages == 1.0) else advantages,
         )
 
     def motion_type(self) -> MotionType:
-        """Which motions the platform has."""
+        """The motion type with its axis."""
         x, y, z = (0.0, 0.0, 1.0) if self.axis is None else self.axis
         return MotionType(self.motion, (float(x), float(y), float(z)))
 
     def is_underactuated(self) -> bool:
-        """Whether there are fewer cables than degrees of freedom: the weight does the rest."""
+        """True if there are fewer cables than degrees of freedom, so that the weight poses it."""
         return len(self.cables) < self.motion_type().freedom
 
     def is_planar(self) -> bool:
-        """Whether the platform is a body in a horizontal plane, as servos know it beside 3R3T."""
+        """True if the platform is a body in a horizontal plane, which servos accept like 3R3T."""
         return self.motion_type().is_horizontal_body
 
     def servo_rows(self, asks: str) -> tuple[int, ...]:
@@ -380,7 +363,7 @@ class Robot(Summarized):
         return rows
 
     def joint(self) -> "PlatformJoint":
-        """What the platform moves by in a simulation."""
+        """The joint of the platform in a simulation."""
         from cdpr_drake.geometry.platform_joint import PlatformJoint
 
         return PlatformJoint.of(self.motion_type(), self.home.transform(), self.plane_height)
@@ -430,13 +413,13 @@ class Robot(Summarized):
 
         Source: servoing thesis (1.15) to (1.20).
         """
-        X_WP, cables = pose_of(self.home, pose), self.cable_set()
-        J = cable_jacobian(X_WP, cables if pulleys else cables.without_pulleys())
+        X_WP = pose_of(self.home, pose)
+        J = cable_jacobian(X_WP, self.cable_set(pulleys))
         W: Array = self.motion_type().components(-J.T, X_WP.rotation().matrix())
         return W
 
     def camera_mount(self, name: str) -> CameraMount:
-        """The mounting of that name; the names are checked when a scenario is read."""
+        """The mounting of a name, which scenarios check when they are read."""
         return next(mount for mount in self.cameras if mount.name == name)
 
 

@@ -59,7 +59,7 @@ def tension_problem(
         robot: The robot; there are the rows of `MotionType.components` only, those of a robot in a
             horizontal plane (moment about z, f_x, f_y).
         X_WP: Pose of the platform.
-        wrench: External wrench on the platform about Po in W, beside its weight, shape (6,)
+        wrench: External wrench on the platform about Po in W, without its weight, shape (6,)
             (moment, force) [N m, N].
         limits: Smallest and largest tension [N]; None: the robot's.
         mass: Mass of the platform [kg]; None: the robot's.

@@ -1,5 +1,6 @@
 """The catalogue of sensors, as published: of tensions, angles, poses, ranges, motion, depth."""
 
+from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -7,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.schema.declarations import FASTEST, In, Text, settings
+from cdpr_drake.schema.declarations import FASTEST, In, Refusal, Scope, Text, number_words, settings
 from cdpr_drake.schema.typed_yaml import closest, load_typed
 
 _FOLDER = Path(__file__).parent / "sensors"
@@ -16,39 +17,44 @@ _Model = TypeVar("_Model")
 
 
 @settings
-class TensionSensorModel:
-    """A type of tension sensor; one is fixed to every cable."""
+class SensorModel:
+    """What files of all sensors say."""
 
     name: Annotated[Text, "Name, the same as that of its file."]
     title: Annotated[Text, "Maker and type."]
     source: Annotated[Text, "Where the values stand."]
+    assumptions: Annotated[Text, "Assumed values, and the reason for each."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits, of sensors that have some, that nothing lies between."""
+        limits = getattr(self, "limits", None)
+        if limits is not None and limits[0] >= limits[1]:
+            yield "limits", number_words(limits), "smallest < largest"
+
+
+@settings
+class TensionSensorModel(SensorModel):
+    """A type of tension sensor; one is fixed to every cable."""
+
     limits: Annotated[np.ndarray, In("N", 2), "Smallest and largest reading."]
     accuracy: Annotated[float, In("N", ge=0.0), "Largest constant error of a sensor."]
     repeatability: Annotated[float, In("N", ge=0.0), "Standard deviation of repeated readings."]
     resolution: Annotated[float, In("N", ge=0.0), "Step between readings; 0: none."] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of readings per second."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 @settings
-class EncoderModel:
+class EncoderModel(SensorModel):
     """A type of encoder; one is on every motor's shaft."""
 
-    name: Annotated[Text, "Name, the same as that of its file."]
-    title: Annotated[Text, "Maker and type."]
-    source: Annotated[Text, "Where the values stand."]
     counts_per_turn: Annotated[int, In(ge=1), "Counts per turn of the motor."]
     rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of readings per second."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 @settings
-class PoseSensorModel:
+class PoseSensorModel(SensorModel):
     """A system that measures the pose of the platform from outside."""
 
-    name: Annotated[Text, "Name, the same as that of its file."]
-    title: Annotated[Text, "Maker and type."]
-    source: Annotated[Text, "Where the values stand."]
     position_accuracy: Annotated[
         float, In("m", ge=0.0), "Constant error of position, where it was registered."
     ]
@@ -66,19 +72,15 @@ class PoseSensorModel:
         float, In("m/rad", ge=0.0), "Error of position per angle from how it was registered."
     ] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0), "Largest number of poses per second."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 @settings
-class RangeSensorModel:
+class RangeSensorModel(SensorModel):
     """A laser scanner, whose beams are a fan in the plane z = 0 of its frame S, or one beam.
 
     Angles are from x, the front, towards y, the left.
     """
 
-    name: Annotated[Text, "Name, the same as that of its file."]
-    title: Annotated[Text, "Maker and type."]
-    source: Annotated[Text, "Where the values stand."]
     first_angle_deg: Annotated[float, In("deg", ge=-360, le=360), "Angle of the first beam."]
     last_angle_deg: Annotated[float, In("deg", ge=-360, le=360), "Angle of the last beam."]
     beams: Annotated[int, In(ge=1, le=10000), "Beams, evenly from the first to the last."]
@@ -89,20 +91,22 @@ class RangeSensorModel:
     ] = 0.0
     resolution: Annotated[float, In("m", ge=0.0), "Step between readings; 0: none."] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Largest number of scans per second."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """Limits that nothing lies between, and angles that go backwards."""
+        yield from super().refusals(scope)
+        if self.first_angle_deg > self.last_angle_deg:
+            yield "first_angle_deg", f"{self.first_angle_deg:g}", "<= last_angle_deg"
 
 
 @settings
-class InertialSensorModel:
+class InertialSensorModel(SensorModel):
     """An inertial measurement unit: three accelerometers and three gyroscopes along x, y, z of S.
 
     White noise by its density, so that it grows with the root of the rate; a bias that begins
     anywhere and walks at random.
     """
 
-    name: Annotated[Text, "Name, the same as that of its file."]
-    title: Annotated[Text, "Maker and type."]
-    source: Annotated[Text, "Where the values stand."]
     accelerometer_noise: Annotated[float, In("m/s^2/sqrt(Hz)", ge=0.0), "Density of white noise."]
     accelerometer_walk: Annotated[float, In("m/s^3/sqrt(Hz)", ge=0.0), "Random walk of the bias."]
     accelerometer_bias: Annotated[
@@ -118,16 +122,12 @@ class InertialSensorModel:
     rate_hz: Annotated[
         float, In("Hz", gt=0.0, le=FASTEST), "Largest number of readings per second."
     ]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 @settings
-class DepthSensorModel:
+class DepthSensorModel(SensorModel):
     """A depth camera; depth is along the optical axis."""
 
-    name: Annotated[Text, "Name, the same as that of its file."]
-    title: Annotated[Text, "Maker and type."]
-    source: Annotated[Text, "Where the values stand."]
     width: Annotated[int, In("px", ge=1, le=4096), "Pixels of a row."]
     height: Annotated[int, In("px", ge=1, le=4096), "Rows."]
     focal_length: Annotated[
@@ -139,7 +139,6 @@ class DepthSensorModel:
         float, In("1/m", ge=0.0), "What is added to that for each square metre of depth squared."
     ] = 0.0
     rate_hz: Annotated[float, In("Hz", gt=0.0, le=FASTEST), "Largest number of images per second."]
-    assumptions: Annotated[Text, "Values that no source gives, and what they were taken from."] = ""
 
 
 def tension_sensor_names() -> tuple[str, ...]:
@@ -163,10 +162,7 @@ def load_tension_sensor(name: str) -> TensionSensorModel:
     Raises:
         RobotFileError: There is none of that name; says which exist.
     """
-    sensor = _load("tension", name, TensionSensorModel)
-    if sensor.limits[0] >= sensor.limits[1]:
-        raise RobotFileError(f"tension sensor {name}: limits: accepted: smallest < largest [N]")
-    return sensor
+    return _load("tension", name, TensionSensorModel)
 
 
 def load_encoder(name: str) -> EncoderModel:
@@ -208,11 +204,7 @@ def load_range_sensor(name: str) -> RangeSensorModel:
     Raises:
         RobotFileError: There is none of that name; says which exist.
     """
-    sensor = _load("range", name, RangeSensorModel)
-    _check_limits(f"range sensor {name}", sensor.limits)
-    if sensor.first_angle_deg > sensor.last_angle_deg:
-        raise RobotFileError(f"range sensor {name}: first_angle_deg: accepted: <= last_angle_deg")
-    return sensor
+    return _load("range", name, RangeSensorModel)
 
 
 def load_inertial_sensor(name: str) -> InertialSensorModel:
@@ -230,14 +222,7 @@ def load_depth_sensor(name: str) -> DepthSensorModel:
     Raises:
         RobotFileError: There is none of that name; says which exist.
     """
-    sensor = _load("depth", name, DepthSensorModel)
-    _check_limits(f"depth sensor {name}", sensor.limits)
-    return sensor
-
-
-def _check_limits(what: str, limits: np.ndarray) -> None:
-    if limits[0] >= limits[1]:
-        raise RobotFileError(f"{what}: limits: accepted: smallest < largest [m]")
+    return _load("depth", name, DepthSensorModel)
 
 
 def _names(kind: str) -> tuple[str, ...]:
@@ -245,7 +230,7 @@ def _names(kind: str) -> tuple[str, ...]:
 
 
 def _load(kind: str, name: str, schema: type[_Model]) -> _Model:
-    what: Any = schema
+    what: Any = schema  # a key of the cache
     model: _Model = _read(kind, name, what)
     return model
 
@@ -255,4 +240,5 @@ def _read(kind: str, name: str, schema: type[Any]) -> Any:
     """Read once, as the catalogue is the package's."""
     if name not in _names(kind):
         raise RobotFileError(f"{kind} sensor {name!r} is unknown; {closest(name, _names(kind))}")
-    return load_typed(schema, _FOLDER / kind / f"{name}.yaml", error=RobotFileError)
+    path = _FOLDER / kind / f"{name}.yaml"
+    return load_typed(schema, path, error=RobotFileError, scope=lambda one: Scope(one, path))

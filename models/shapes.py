@@ -45,14 +45,14 @@ _NEEDS = {BOX: "size", SPHERE: "radius", CYLINDER: "radius", MESH: "file"}
 class PlatformShape:
     """The platform's shape within its box, with which pulleys and clearances reckon."""
 
-    kind: Annotated[str, OneOf((BOX, SPHERE, CYLINDER, MESH)), "What it is."]
+    kind: Annotated[str, OneOf((BOX, SPHERE, CYLINDER, MESH)), "Kind of shape."]
     size: Annotated[np.ndarray | None, In("m", 3, gt=0.0), "Edges of a box."] = None
-    radius: Annotated[float | None, In("m", gt=0.0), "Of a sphere or cylinder."] = None
-    height: Annotated[float | None, In("m", gt=0.0), "Of a cylinder, along its z axis."] = None
+    radius: Annotated[float | None, In("m", gt=0.0), "Radius of a sphere or cylinder."] = None
+    height: Annotated[float | None, In("m", gt=0.0), "Height of a cylinder, along z."] = None
     file: Annotated[
         Text | None,
         "File of a mesh, from the robot file's folder: Wavefront OBJ or glTF; its "
-        "triangles must enclose a volume where the inertia follows from it.",
+        "triangles must enclose a volume if the inertia follows from it.",
     ] = None
     scale: Annotated[float, In("-", gt=0.0), "Scale of a mesh, to metres."] = 1.0
     position: Annotated[
@@ -100,7 +100,7 @@ class PlatformShape:
         return Cylinder(self.radius, self.height)
 
     def extent(self, middle: Array) -> tuple[Array, Array]:
-        """Lower and upper corner in P of the box round it, axes along those of P, (3,) [m].
+        """Lower and upper corner in P of its bounding box along the axes of P, (3,) [m].
 
         Raises:
             RobotFileError: The mesh cannot be read.
@@ -208,7 +208,7 @@ def _mesh_inertia(file: str, scale: float, changed: int) -> "SpatialInertia":
 
 
 def mesh_files(file: Path) -> list[Path]:
-    """A mesh and the files beside it that it names: materials of an OBJ, parts of a glTF.
+    """A mesh and the files that it names: materials of an OBJ, parts of a glTF.
 
     Raises:
         RobotFileError: A glTF is no JSON, or its buffers and images are no lists of objects.
@@ -289,9 +289,9 @@ class Frame:
         In("m", gt=0.0),
         "Thickness of the beams, for drawing; null: a share of the longest edge.",
     ] = None
-    beams: Annotated[
-        list[FrameBeam], "Its beams, in the place of those on the edges of the box."
-    ] = filled(list)
+    beams: Annotated[list[FrameBeam], "Its beams, instead of those on the edges of the box."] = (
+        filled(list)
+    )
     assumed: Annotated[
         Switch,
         "True if its corners were assumed, as the robot's source gives none. Such a frame"

@@ -63,10 +63,12 @@ class DrumLayers:
 class WinchLoops:
     """The inner loops of the drives."""
 
-    velocity_bandwidth: Annotated[float, In("rad/s", gt=0.0), "Of the speed loop."] = 200.0
-    position_bandwidth: Annotated[float, In("1/s", gt=0.0), "Of the position loop around it."] = (
-        20.0
+    velocity_bandwidth: Annotated[float, In("rad/s", gt=0.0), "Bandwidth of the speed loop."] = (
+        200.0
     )
+    position_bandwidth: Annotated[
+        float, In("1/s", gt=0.0), "Bandwidth of the position loop around it."
+    ] = 20.0
 
 
 @settings
@@ -92,7 +94,7 @@ class Winch:
     brake_torque: Annotated[
         float | None,
         In("N m", gt=0.0),
-        "What the holding brake holds at the motor's shaft; null: no brake.",
+        "Torque that the holding brake holds at the motor's shaft; null: no brake.",
     ] = None
     loops: Annotated[WinchLoops, "Inner loops."] = filled(WinchLoops)
 

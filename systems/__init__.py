@@ -1,7 +1,7 @@
 """Drake blocks of cable robots, their settings, and what wires them into diagrams.
 
 * Blocks, each with its settings beside it: `robots`, `cameras`, `sensors`, `estimators`,
-  `controllers`, `monitoring`, `worlds`, and `remote` for a process outside.
+  `controllers`, `monitoring`, `worlds`.
 * `scenarios` composes settings into files, `diagrams` adds blocks to a builder.
 * `pick_and_place` takes a box and sets it down; `loops` runs a visual servo without a diagram.
 

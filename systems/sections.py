@@ -33,6 +33,7 @@ SECTIONS = {
     "visual_servo.adaptation": "cdpr_drake.sections.adaptation.section:Adaptation",
     "visual_servo.emergency": "cdpr_drake.sections.emergency.section:EmergencySettings",
     "visual_servo.stability": "cdpr_drake.sections.stability.section:StabilitySettings",
+    "visual_servo.pose_plan": "cdpr_drake.sections.pose_plan.section:PosePlanSettings",
     "robot_scenario.disturbances": "cdpr_drake.sections.disturbances.section:DisturbanceSettings",
     "visual_servo.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
     "tension_control.remote": "cdpr_drake.sections.remote.section:RemoteSettings",
@@ -120,7 +121,7 @@ class Section:
         """Makers of blocks of dynamic control in the place of the usual ones.
 
         Args:
-            settings: The `TensionControlSettings` of a run, with the usual makers.
+            settings: The `TensionControlSettings` with the makers so far, and what is believed.
             robot: The robot.
 
         Returns:
@@ -263,7 +264,7 @@ def with_sections(place: str) -> Callable[[type], type]:
 def sections_at(place: str) -> dict[str, type[Section]]:
     """Classes of the sections of a place, by their keys.
 
-    Another package's section that cannot be imported is left out, with a warning.
+    One that cannot be imported is left out, with a warning; a fault in one of this package raises.
     """
     classes = {}
     foreign = {point.name: point.value for point in entry_points(group=GROUP)}
@@ -274,9 +275,9 @@ def sections_at(place: str) -> dict[str, type[Section]]:
         try:
             section = load_object(target)
         except Exception as problem:
-            if name in SECTIONS:
+            if name in SECTIONS and not isinstance(problem, ModuleNotFoundError):
                 raise
-            _LOG.warning("entry point %s = %s: left out: %s", name, target, problem)
+            _LOG.warning("section %s = %s: left out: %s", name, target, problem)
             continue
         classes[key] = section
     return classes

@@ -7,8 +7,8 @@
 * The log grows on disk, with checkpoints beside it, so whatever ends the program loses a few
   seconds of a run. A run that goes on comes to the same numbers as an uninterrupted one, bit for
   bit.
-* Verbs: `simulate` and `finish_run`, `repeat_run` over seeds, `serve` with a process outside in the
-  loop, `compare_reactions` to a broken cable, `assess_run` for stability along a run.
+* Verbs: `simulate` and `finish_run`, `repeat_run` over seeds, `assess_run` for stability along a
+  run.
 """
 
 import lazy_loader

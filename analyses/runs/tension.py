@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -98,8 +97,6 @@ class TensionRun(Run):
             seed=scenario.seed,
             damping=scenario.damping,
         )
-        for _, section in sections_of(scenario):
-            settings = replace(settings, **section.tension_blocks(settings, robot))
         return build_tension_control(robot, settings, log_rate=scenario.log_rate)
 
     def check(self) -> list[str]:

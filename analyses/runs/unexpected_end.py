@@ -92,7 +92,7 @@ def _missed_limits(run: ServoRun, keys: list[str]) -> list[str]:
     times, stop = log["time"], scenario.stop
     rows = np.flatnonzero((log["found"][:, 0] > 0.0) & (times >= times[-1] - LAST))
     over = f"duration = {scenario.duration:g} s was over"
-    if scenario.open_loop is not None or scenario.pose_plan is not None:
+    if scenario.open_loop is not None or "X_WP_goal" in log:  # by a plan
         keys.append("duration")
         return [over]
     if not len(rows):

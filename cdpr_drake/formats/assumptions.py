@@ -12,7 +12,6 @@ from pydrake.math import RollPitchYaw, RotationMatrix
 from cdpr_drake.arrays import Array
 from cdpr_drake.formats.draft import RobotDraft
 from cdpr_drake.formats.home_search import farthest_pose
-from cdpr_drake.formats.point_mass import find_beam, to_a_point
 from cdpr_drake.schema.declarations import LARGEST
 
 GRAVITY = 9.81
@@ -37,6 +36,9 @@ FLAT = 0.25
 """Exit points within this share of their horizontal extent lie in a plane that robots hang from."""
 
 _TRIANGLE = 1e-9
+
+SAME_POINT = 1e-9
+"""Anchor points nearer to each other [m] are one."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
         "motion": draft.motion or _assume(assumed, "motion", "3R3T", "a free body"),
     }
     if content["motion"] == "2R3T":
-        find_beam(draft)
+        _find_beam(draft)
     if draft.axis is not None and not np.array_equal(draft.axis, (0.0, 0.0, 1.0)):
         content["axis"] = _list(draft.axis)
     planar = draft.is_level()
@@ -89,7 +91,7 @@ def complete_draft(draft: RobotDraft) -> CompletedDraft:
     if not np.array_equal(draft.down(), (0.0, 0.0, -1.0)):
         content["gravity_direction"] = _list(draft.down())
     if draft.motion_type().is_point:
-        to_a_point(draft, remarks)
+        _to_a_point(draft, remarks)
     content["platform"] = _platform(draft, assumed, remarks, planar)
     lower, upper = _tensions(draft, gravity, assumed, remarks)
     content["cable"] = _material(draft, upper, assumed)
@@ -409,3 +411,65 @@ def _float(value: float) -> float:
 
 def _list(values: Any) -> list[float]:
     return [float(value) for value in np.asarray(values, float)]
+
+
+def import_readme(name: str, source: str, tool: str, completed: CompletedDraft) -> str:
+    """The README, as Markdown.
+
+    Args:
+        name: Name of the robot or mechanism.
+        source: Name of the file that it came from.
+        tool: The format of that file, in words.
+        completed: What the file gave and lacked.
+    """
+    given = [f"- `{key}`" for key in completed.given]
+    assumed = [f"| `{key}` | {words} |" for key, words in completed.assumed.items()]
+    remarks = [f"- {words}" for words in completed.remarks] or ["- nothing"]
+    return "\n".join(
+        [
+            f"# {name}", "", f"Imported from `{source}` ({tool}).",
+            "", "## From the file", "", *given, "", "## Assumed, for the file lacks it", "",
+            "| key | value |", "| --- | --- |", *assumed, "", "## Read otherwise or not kept",
+            "", *remarks, "",
+        ]
+    )  # fmt: skip
+
+
+def _to_a_point(draft: RobotDraft, remarks: list[str]) -> None:
+    """Puts Po of a point mass where its cables hold it.
+
+    A platform that does not turn is held alike by cables whose two ends are shifted together.
+    """
+    R = np.eye(3) if draft.R_WP is None else draft.R_WP
+    anchors = draft.anchor_points()
+    p_PQ = anchors[:, 0].copy()
+    if np.ptp(anchors, axis=1).max() > SAME_POINT:
+        p_PQ = np.zeros(3)
+        remarks.append(
+            f"Its cables hold a platform that does not turn, {draft.motion}, in several points; a "
+            "point mass here has one, and got exit points that are shifted as much."
+        )
+        for cable in draft.cables:
+            cable.exit_point = cable.exit_point - R @ cable.anchor_point
+    for cable in draft.cables:
+        cable.anchor_point = np.zeros(3)
+    if np.any(p_PQ):
+        remarks.append("Po was put into the point that holds the cables.")
+        if draft.home_position is not None:
+            draft.home_position = draft.home_position + R @ p_PQ
+        if draft.plane_height is not None:
+            draft.plane_height += float((R @ p_PQ)[2])
+        if draft.box_center is not None:
+            draft.box_center = draft.box_center - p_PQ
+    if draft.center_of_mass is not None and np.any(draft.center_of_mass != p_PQ):
+        remarks.append("The centre of mass of a point mass is the point that holds the cables.")
+    draft.center_of_mass = np.zeros(3)
+
+
+def _find_beam(draft: RobotDraft) -> None:
+    """Gives a beam whose file does not name its axis that of the farthest anchor point from Po."""
+    anchors = draft.anchor_points()
+    reach = np.linalg.norm(anchors, axis=0)
+    if draft.axis is None and np.max(reach) > 0.0:
+        far = int(np.argmax(reach))
+        draft.axis = anchors[:, far] / reach[far]

@@ -12,12 +12,11 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.formats.assumptions import CompletedDraft
+from cdpr_drake.formats.assumptions import CompletedDraft, import_readme
 from cdpr_drake.formats.caspr import TOOL, is_caspr_tree, model_files
 from cdpr_drake.formats.caspr_mechanism import write_mechanism
 from cdpr_drake.formats.caspr_of_plant import LinksOfPlant, links_of_plant
 from cdpr_drake.formats.caspr_pulleys import short_name
-from cdpr_drake.formats.caspr_tree_writer import CABLE_SET, write_tree
 from cdpr_drake.formats.caspr_trees import (
     GRAVITY,
     CasprCable,
@@ -25,7 +24,7 @@ from cdpr_drake.formats.caspr_trees import (
     excess,
     read_tree,
 )
-from cdpr_drake.formats.import_words import import_readme
+from cdpr_drake.formats.caspr_writer import CABLE_SET, write_tree
 from cdpr_drake.formats.tree_assumptions import complete_tree
 from cdpr_drake.geometry.cable_routes import CableRoutes
 from cdpr_drake.models.foreign_text import robot_name
@@ -81,7 +80,7 @@ class ImportedMechanism(Summarized):
         }
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         tree, made = self.tree, self.completed
         return f"Mechanism {self.name} from {TOOL}", [
             ("source", str(self.source)),

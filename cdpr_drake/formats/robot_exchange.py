@@ -11,13 +11,12 @@ import numpy as np
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.formats.assumptions import CompletedDraft, complete_draft
+from cdpr_drake.formats.assumptions import CompletedDraft, complete_draft, import_readme
 from cdpr_drake.formats.caspr_writer import write_caspr
 from cdpr_drake.formats.detection import read_foreign
 from cdpr_drake.formats.draft import DraftCable, RobotDraft
 from cdpr_drake.formats.drake_package import write_drake_package
 from cdpr_drake.formats.gazebo_yaml import write_gazebo_yaml
-from cdpr_drake.formats.import_words import import_readme
 from cdpr_drake.formats.joint_chains import write_sdformat, write_urdf
 from cdpr_drake.formats.klipper import write_klipper
 from cdpr_drake.formats.maslow import write_maslow
@@ -30,11 +29,7 @@ from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_in_plant import platform_inertia
-from cdpr_drake.models.robot_loader import (
-    as_robot,
-    parse_robot,
-    point_notes,
-)
+from cdpr_drake.models.robot_loader import as_robot, parse_robot, point_notes
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.summaries import Summarized
 
@@ -77,7 +72,7 @@ class ImportedRobot(Summarized):
         }
 
     def summary(self) -> tuple[str, list[tuple[str, str]]]:
-        """What it shows of itself."""
+        """Title and rows of its table."""
         robot, made = self.robot, self.completed
         return f"Robot {robot.name} from {self.tool}", [
             ("source", str(self.source)),

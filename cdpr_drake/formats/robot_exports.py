@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import is_dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from cdpr_drake.models.foreign_text import robot_name
 from cdpr_drake.models.robot_copies import gravity_turn, turned_robot, world_turn
 from cdpr_drake.models.robot_holding import lengths_at_home
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.declarations import number_words, settings_of
 
 EXPORTS = {
     "sdf": "SDFormat with chains of joints for cables, closed by ball joints, for Gazebo",
@@ -92,7 +93,7 @@ _WORDS = {
     "cables[].rail.": "exit points were written where they stand",
     "cables[].winch": "each cable has a winch of its own there",
 }
-"""What stands in the place of fields that are left out, by the beginnings of their keys."""
+"""What replaces fields that are left out, by the beginnings of their keys."""
 
 _IN_THE_PLACE = {
     "platform.shape.": ("platform.size", "the platform was written as its box"),
@@ -140,26 +141,18 @@ def _leaves(section: Any, prefix: str, added: bool) -> Iterator[tuple[str, Any, 
 
     In a section that was added to what the schema fills in, only null is.
     """
-    for field in fields(section):
-        key, value = f"{prefix}{field.name}", getattr(section, field.name)
+    for name, setting in settings_of(type(section)).items():
+        key, value = f"{prefix}{name}", getattr(section, name)
         items = value if isinstance(value, list) else [value]
         if items and is_dataclass(items[0]):
-            more = added or (not is_dataclass(_default(field)) and not _is_required(field))
+            more = added or (not is_dataclass(setting.default) and not setting.required)
             mark = "[]." if isinstance(value, list) else "."
             for item in items:
                 yield from _leaves(item, key + mark, more)
-        elif value is None or added or _is_required(field):
-            yield key, value, value is None and not _is_required(field)
+        elif value is None or added or setting.required:
+            yield key, value, value is None and not setting.required
         else:
-            yield key, value, bool(np.array_equal(value, _default(field)))
-
-
-def _is_required(field: Field[Any]) -> bool:
-    return field.default is MISSING and field.default_factory is MISSING
-
-
-def _default(field: Field[Any]) -> Any:
-    return field.default_factory() if field.default_factory is not MISSING else field.default
+            yield key, value, bool(np.array_equal(value, setting.default))
 
 
 def export_omissions(robot: Robot, format: str) -> dict[str, str]:
@@ -317,7 +310,7 @@ def _middle_of_box(robot: Robot, format: str) -> dict[str, str]:
         return {}
     middle, lost = robot.box_center(), dict[str, str]()
     if np.any(middle):
-        words = f"Po was put in the middle of the box, {_numbers(middle)} m from here in P"
+        words = f"Po was put in the middle of the box, {number_words(middle)} m from here in P"
         keys = ("cables[].anchor_point", "home.position", "platform.box_center")
         lost = dict.fromkeys((*keys, "platform.center_of_mass"), words)
     if np.any(robot.center_of_mass() != middle):
@@ -383,7 +376,7 @@ def _frame(robot: Robot, format: str) -> dict[str, str]:
     marked = bool(again.get("assumed", False))
     lost = {} if marked == robot.frame.assumed else {_ASSUMED: f"is read back as {marked}".lower()}
     return lost | {
-        f"frame.{key}": f"is read back as {_numbers(again[key])} m, round what the file shows"
+        f"frame.{key}": f"is read back as {number_words(again[key])} m, round what the file shows"
         for key, value in ends.items()
         if not np.allclose(again[key], value, rtol=0.0, atol=1e-12)
     }
@@ -405,10 +398,6 @@ def _moved_only(robot: Robot, corner: Array) -> Array:
 def _rest(robot: Robot, format: str) -> dict[str, str]:
     why = lengths_at_home(robot)[1] if format == "mjcf" else ""
     return {"home": f"is no pose of rest, since {why}"} if why else {}
-
-
-def _numbers(values: Any) -> str:
-    return "(" + ", ".join(f"{float(value):.6g}" for value in values) + ")"
 
 
 _RULES: tuple[Callable[[Robot, str], dict[str, str]], ...] = (

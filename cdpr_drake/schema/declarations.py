@@ -24,22 +24,22 @@ from typing import Annotated, Any, dataclass_transform, get_args, get_origin
 import numpy as np
 
 SMALLEST, LARGEST = 1e-100, 1e30
-"""Sizes of numbers but zero in any unit; squares and cubes of others are no floats any more."""
+"""Accepted sizes of numbers other than 0, in any unit: their cubes are floats, too."""
 
 LONGEST = 1e4
-"""Of frames, platforms and points [m]; cables of kilometres are what has been built."""
+"""Largest coordinate and edge [m]; the longest cables that were built measure kilometres."""
 
 FASTEST = 1e5
-"""Largest rate of images, control steps and rows of a log [Hz]; nothing here is sampled faster."""
+"""Largest rate of images, control steps and rows of a log [Hz]."""
 
 NAME = r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
-"""Names of scenarios, robots, cables and the like."""
+"""Pattern of names of scenarios, robots, cables."""
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff]")
-"""What controls a terminal and no figure can draw; ends of lines and tabs are text."""
+"""Characters that control a terminal; ends of lines and tabs are text."""
 
 _FIELDS = "Attributes:"
-"""What stands above the fields in the docstring of a class of settings."""
+"""Title of the fields in the docstring of a class of settings."""
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(dataclasses.field,))
@@ -61,7 +61,7 @@ def settings(kind: Any = None, *, repr: bool = True) -> Any:
 
 
 def filled(factory: Callable[[], Any]) -> Any:
-    """A default that is made anew for each."""
+    """A default that `factory` makes anew for each object."""
     return dataclasses.field(default_factory=factory)
 
 
@@ -113,8 +113,8 @@ class In(Rule):
         unit: Unit.
         shape: Of the array; () for one number.
         bounds: Of each number, by `gt`, `ge`, `lt`, `le`.
-        single: Whether one number counts as an array of it.
-        direction: Whether not all of an array may be zero.
+        single: True if one number counts as an array of it.
+        direction: True if an array of zeros is refused.
     """
 
     unit: str
@@ -216,7 +216,7 @@ def _is_without_sense(words: str) -> bool:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class OneOf(Rule):
-    """A word of a collection; a table in its place counts with what it has later."""
+    """A word of a collection, which may grow after the class was made."""
 
     choices: Collection[str]
 
@@ -311,9 +311,9 @@ class Setting:
         name: Its name.
         doc: What it means.
         type: The type of one value.
-        rule: What one value may be; None: it is a section.
-        many: `list` or `dict` where there are several; None: one.
-        nullable: Whether it may be null.
+        rule: What one value may be; None: a section.
+        many: `list` or `dict` of values; None: one value.
+        nullable: True if it may be null.
         field: The field of the dataclass, with its default.
     """
 
@@ -327,7 +327,7 @@ class Setting:
 
     @property
     def section(self) -> Any:
-        """The class of settings of one value; None: it is none."""
+        """The class of settings of one value; None: no section."""
         return self.type if self.rule is None else None
 
     @property
@@ -340,13 +340,13 @@ class Setting:
 
     @property
     def required(self) -> bool:
-        """Whether a file has to give it."""
+        """True if a file has to give it."""
         missing = dataclasses.MISSING
         return self.field.default is missing and self.field.default_factory is missing
 
     @property
     def default(self) -> Any:
-        """What it is where a file does not give it."""
+        """Its value where a file does not give it, made anew."""
         factory = self.field.default_factory
         return self.field.default if factory is dataclasses.MISSING else factory()
 
@@ -397,7 +397,7 @@ _KNOWN: dict[type, dict[str, Setting]] = {}
 
 
 def settings_of(schema: type) -> dict[str, Setting]:
-    """The fields of a class of settings by name; found once, and not to be changed."""
+    """The fields of a class of settings by name, collected once; do not change them."""
     if schema not in _KNOWN:
         hints = typing.get_type_hints(schema, include_extras=True)
         fields = dataclasses.fields(schema)
@@ -426,22 +426,22 @@ def _setting(field: dataclasses.Field[Any], hint: Any) -> Setting:
 
 Refusal = tuple[str, object, str]
 """A key within a section, empty for itself, or after a / a key of the whole file; what was found
-there, in words; and what is accepted, or empty where the words tell that, too."""
+there, in words; what is accepted, or empty if the words before say it."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Scope:
-    """What is round a section, for its `refusals`.
+    """Surroundings of a section, for its `refusals`.
 
-    A class of settings may have a method `refusals(scope)` that yields what no single field can
-    tell: a `Refusal` for each thing that its fields together, or with the scope, cannot be. If it
-    raises, that is passed over where it or a section within it refuses something, else raised.
+    A class of settings may have a method `refusals(scope)` that yields a `Refusal` for each
+    combination of its fields, or with the scope, that is not accepted. An exception is passed over
+    if the section or one within it refuses something, since it may follow from that.
 
     Attributes:
         whole: The settings of the whole file.
         path: The file; None: code made them.
         robot: The robot or mechanism of a scenario.
-        more: Functions that yield what else the whole is refused for.
+        more: Functions that yield further refusals of the whole.
     """
 
     whole: Any

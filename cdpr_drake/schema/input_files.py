@@ -25,7 +25,7 @@ from tempfile import TemporaryDirectory
 from typing import Any, Generic, Self, TypeVar
 
 _MADE = "|made"
-"""Behind a path: what was made of it, in the place of what it holds."""
+"""End of a key of what was made of a file or folder, instead of its content."""
 
 
 class InputFiles:
@@ -181,7 +181,7 @@ def made_of_input(path: Path, make: Callable[[], str]) -> str:
 
 
 def input_path(path: Path, beside: Iterable[Path] = ()) -> Path:
-    """Where a library finds a file by itself, with the content that was read, and others beside it.
+    """Where a library finds a file by itself, with the content that was read, and further files.
 
     Args:
         path: The file.

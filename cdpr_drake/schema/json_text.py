@@ -1,4 +1,4 @@
-"""Reads JSON, whoever wrote it: what a damaged or hostile text does is one kind of error."""
+"""Reads JSON of any source: damaged and hostile texts raise one kind of error."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Reads YAML files into settings, and says every problem with file, line and key.
+"""Reads YAML files into settings, and names every problem with file, line and key.
 
 PyYAML knows lines, pydantic checks values, their rules say in words what they may be, and sections
-refuse what no single field can tell.
+refuse combinations of fields.
 """
 
 from __future__ import annotations
@@ -17,13 +17,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import yaml
 
-from cdpr_drake.errors import (
-    MOST_PROBLEMS,
-    DataFileError,
-    Problems,
-    meant_names,
-    why_not_read,
-)
+from cdpr_drake.errors import MOST_PROBLEMS, DataFileError, Problems, meant_names, why_not_read
 from cdpr_drake.schema.declarations import Scope, Setting, settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.yaml_files import (
@@ -41,7 +35,7 @@ Place = tuple[str | int, ...]
 
 _TAG = "tag:yaml.org,2002:"
 _SCALARS = frozenset({"str", "int", "float", "bool", "null", "timestamp", "value", "merge"})
-"""What YAML takes plain words for; another tag was written there."""
+"""Tags that YAML gives plain words; any other tag is written in the file."""
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
 
@@ -61,8 +55,8 @@ def load_typed(
         path: YAML file.
         error: Class of the error to raise.
         overrides: Items "key.subkey=value" that replace what the file says; the value is YAML.
-        scope: Says what is round the settings once they are read, and may complete them; None:
-            nothing is, and their `refusals` are not asked.
+        scope: Gives the surroundings of the settings that were read, and may complete them; None:
+            their `refusals` are not asked.
 
     Raises:
         error: The file cannot be read or parsed, a key is unknown or missing, a value has the wrong
@@ -89,7 +83,7 @@ def parse_typed(
     scope: Callable[[T], Scope] | None = None,
     lines: bool = True,
 ) -> T:
-    """As `load_typed`, of YAML that is there already.
+    """As `load_typed`, from text.
 
     Args:
         schema: As for `load_typed`.
@@ -98,7 +92,7 @@ def parse_typed(
         error: As for `load_typed`.
         overrides: As for `load_typed`.
         scope: As for `load_typed`.
-        lines: Whether the YAML is what stands in that file, so that messages name its lines.
+        lines: True if the YAML is the content of that file, so that messages name its lines.
 
     Raises:
         error: As `load_typed`.
@@ -139,13 +133,13 @@ def refuse(
     robot: Any = None,
     error: type[DataFileError] = DataFileError,
 ) -> None:
-    """Raises what settings refuse that were made by code, or from a file of another tool.
+    """Raises the refusals of settings that code made, or a file of another tool.
 
     Args:
         settings: The settings.
         key: The key of a section in a file, for the message.
         path: File for the message.
-        robot: The robot that a section is for, if it asks for one.
+        robot: The robot of the section; None: its refusals need none.
         error: Class of the error to raise.
 
     Raises:
@@ -158,7 +152,7 @@ def refuse(
 
 @lru_cache(32)
 def _nodes(content: str) -> yaml.Node | None:
-    """Nodes, which nothing here changes; the same files are read again and again."""
+    """Nodes, which nobody changes, of files that are read repeatedly."""
     return compose_yaml(content)
 
 
@@ -182,7 +176,7 @@ def dump_typed(settings: Any) -> str:
 
 
 def plain_values(settings: Any) -> dict[str, Any]:
-    """What settings say, as mappings, lists, words and numbers of one's own; None is left out."""
+    """Copies of settings as mappings, lists, words and numbers; None is left out."""
     values = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
     return {name: _plain(value) for name, value in values.items() if value is not None}
 
@@ -287,7 +281,7 @@ def _override(schema: type, data: dict[str, Any], item: str, problems: _Problems
 
 
 class _Problems:
-    """What a file is refused for, in the order of its lines."""
+    """Problems of a file, in the order of its lines."""
 
     def __init__(
         self, error: type[DataFileError], path: Path | None, root: yaml.Node | None
@@ -299,11 +293,11 @@ class _Problems:
         self._said: list[tuple[float, str]] = []
 
     def note(self, words: str) -> None:
-        """Of an override that is none, or of another file."""
+        """Adds words on no place of the file: on a malformed override, or on another file."""
         self._said.append((-1, words))
 
     def add(self, place: Place, words: str, at_key: bool = False) -> None:
-        """What is wrong with a value, or at its key."""
+        """Adds what is wrong with a value, or with its key."""
         key = key_of(place)
         for origin in (place[:n] for n in range(len(place), 0, -1)):
             if origin in self.origins:
@@ -317,7 +311,7 @@ class _Problems:
         self._said.append((line, f"{file}{key + ': ' if key else ''}{words}"))
 
     def add_all(self, errors: Iterable[Any]) -> None:
-        """What pydantic found, no more of it than anybody reads."""
+        """Adds errors of pydantic, at most `MOST_PROBLEMS`."""
         errors = list(errors)[:MOST_PROBLEMS]
         unknown = [error["loc"] for error in errors if error["type"] in _UNKNOWN]
         meant = {
@@ -332,10 +326,9 @@ class _Problems:
             self.add(place, self._words(error), error["type"] in _UNKNOWN)
 
     def add_refusals(self, settings: Any, scope: Scope, within: Place = ()) -> None:
-        """What sections refuse.
+        """Adds what sections refuse; raises their exceptions as `Scope` says.
 
-        An exception of a section is raised, unless the section or one within it refuses something:
-        it may follow from that. Sections are asked in any order, so all of them are asked before.
+        All sections are asked first, as one within may explain the exception of an outer one.
         """
         asked = [(at, each.refusals) for at, each in _sections(settings, within)
                  if hasattr(each, "refusals")]  # fmt: skip
@@ -403,7 +396,7 @@ def _sections(section: Any, place: Place) -> Iterator[tuple[Place, Any]]:
 
 
 def _owner(schema: type, place: Place) -> tuple[type, Setting | None]:
-    """The class of the section that a place lies in, and its setting; None: there is no such."""
+    """The class of the section that a place lies in, and its setting; None: an unknown key."""
     setting = settings_of(schema).get(str(place[0]))
     rest = place[2:] if setting is not None and setting.many else place[1:]
     if rest and setting is not None and setting.section:
@@ -412,7 +405,7 @@ def _owner(schema: type, place: Place) -> tuple[type, Setting | None]:
 
 
 def _nodes_at(root: yaml.Node, place: Place) -> tuple[yaml.Node, yaml.Node]:
-    """The nodes of the key and of the value of a place, or of what is nearest round it."""
+    """The nodes of key and value of a place, or of the nearest one around it."""
     key = node = root
     for part in place:
         if isinstance(node, yaml.SequenceNode) and isinstance(part, int):
@@ -426,7 +419,7 @@ def _nodes_at(root: yaml.Node, place: Place) -> tuple[yaml.Node, yaml.Node]:
 
 
 def closest(name: str, known: Iterable[str]) -> str:
-    """Words that help after an unknown name: the likely one, then all that exist."""
+    """Words after an unknown name: the likely one, then all known ones."""
     names = list(known)
     hint = "".join(f"did you mean {likely}? " for likely in meant_names(name, names))
     return f"{hint}known: {', '.join(names)}"

@@ -1,8 +1,8 @@
-"""Reads YAML, whoever wrote it: `compose_yaml` gives its nodes, `load_yaml` what they say.
+"""Reads YAML of any source: `compose_yaml` gives its nodes, `load_yaml` their values.
 
 All YAML goes through these two. They refuse what is large, nested deeply, or large once its
-aliases are expanded: files of robots and scenarios are small, and a bomb is told at once.
-`other_kind` tells a file that was given to the wrong loader, from the keys at its top.
+aliases are expanded: files of robots and scenarios are small, and a bomb is refused at once.
+`other_kind` recognises a file that was given to the wrong loader by the keys at its top.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ FILE_KINDS: dict[str, tuple[frozenset[str], str]] = {
         "cdpr_drake.analyses.workspaces.stability_defaults.load_bounds",
     ),
 }
-"""What files describe: keys that only those have, all of them, and what loads them."""
+"""Kinds of files: keys that each file of a kind has and no other, and its loader."""
 
 MOST_BYTES = 262_144
-"""Of a file; the largest of this package's own has 20 kB, and more would take seconds to parse."""
+"""Largest file; those of this package have up to 20 kB, and larger ones take seconds to parse."""
 
 MOST_NODES = 100_000
-"""Keys and values of a file, those that an alias repeats counted again."""
+"""Most keys and values of a file; those behind an alias count each time."""
 
 
 class YamlTextError(CdprError, ValueError):
-    """Text that is not YAML, or more of it than is read; in words that follow a file's name."""
+    """Text is not YAML, or too much of it; in words that follow a file's name."""
 
     def __init__(self, words: str, line: int | None = None) -> None:
         """With the line of the text where it is known, from 1."""
@@ -98,7 +98,7 @@ def compose_yaml(content: str) -> yaml.Node | None:
 
 
 def load_yaml(content: str) -> Any:
-    """What a YAML text says: mappings, lists, words and numbers.
+    """The values of a YAML text: mappings, lists, words and numbers.
 
     Raises:
         YamlTextError: As `compose_yaml`, or a value is not what its tag says.

@@ -21,6 +21,8 @@ from .perception.section import PanTiltSettings as PanTiltSettings
 from .perception.section import RangeSettings as RangeSettings
 from .perception.wheel_odometry import WheelModel as WheelModel
 from .perception.wheel_odometry import WheelOdometry as WheelOdometry
+from .pose_plan.section import PlannedPoseServo as PlannedPoseServo
+from .pose_plan.section import PosePlanSettings as PosePlanSettings
 from .predictive.section import PredictiveDistributor as PredictiveDistributor
 from .predictive.section import PredictiveSettings as PredictiveSettings
 from .stability.section import StabilitySettings as StabilitySettings

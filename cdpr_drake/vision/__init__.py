@@ -1,4 +1,4 @@
-"""What a camera sees: targets, textures, cables; lenses; and how all are found in an image.
+"""What a camera sees through its lens: targets, textures, cables; how images show where they are.
 
 Pixels are (u right, v down) from the centre of the first pixel; the camera frame C has z forward,
 x right, y down.

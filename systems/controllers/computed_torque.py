@@ -5,7 +5,6 @@ Source: see `control.task_space.computed_torque`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from pydrake.common.value import AbstractValue, Value
@@ -75,10 +74,7 @@ class PoseTracking(LeafSystem):
 
     Attributes:
         dynamics: What the controller believes of the platform.
-        logged: Names of further outputs that a run logs.
     """
-
-    logged: Sequence[str] = ()
 
     def __init__(
         self,
@@ -130,6 +126,10 @@ class PoseTracking(LeafSystem):
     def _declare_memory(self) -> set[DependencyTicket]:
         """Declares what the wrench depends on beside time and the platform's state."""
         return set()
+
+    def logged(self) -> tuple[str, ...]:
+        """Names of the outputs that a log keeps, which are vectors."""
+        return ("desired_wrench",)
 
     def packed(self) -> TrackingStep:
         """Its constants, for loops that are compiled as a whole."""

@@ -24,7 +24,6 @@ from cdpr_drake.systems.diagrams.controller import make_tasks, scheme_refusals
 from cdpr_drake.systems.diagrams.fusion_checks import fusion_refusals
 from cdpr_drake.systems.diagrams.tension_management import management_refusals
 from cdpr_drake.systems.diagrams.torque_control import (
-    plan_refusals,
     torque_refusals,
     winch_group_refusals,
 )
@@ -260,7 +259,6 @@ SERVO_REFUSALS: tuple[Callable[[Scope], Iterator[Refusal]], ...] = (
     _winches,
     winch_group_refusals,
     torque_refusals,
-    plan_refusals,
     _integration,
     _world,
 )

@@ -13,7 +13,6 @@ from cdpr_drake.servoing.servo_task import BelievedRobot, CameraMounting
 from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopServo, open_loop_plan
-from cdpr_drake.systems.controllers.planned_pose_servo import PlannedPoseServo
 from cdpr_drake.systems.diagrams.beliefs import (
     believed_external_camera,
     believed_robot,
@@ -94,7 +93,7 @@ class ServoModel:
         return seen_pose_error(self.X_CO(X_WP, time), self.X_CdO, self.free_rotation)
 
     def make_servo(self, settings: VisualServoSettings) -> FeatureServo:
-        """The block of the law, or of a plan."""
+        """The block of the law, or of a plan, or what a section has in its place."""
         controller, target, pinhole = self.controller, self.target, self.pinhole
         rate = settings.controller.rate
         for _, section in sections_of(settings):
@@ -103,10 +102,6 @@ class ServoModel:
                 return servo
         if self.plan is not None:
             return OpenLoopServo(controller, target, pinhole, rate, self.plan)
-        if settings.pose_plan is not None:
-            goals = [task.desired.transform() for task in settings.tasks()]
-            way = settings.pose_plan.plan()
-            return PlannedPoseServo(controller, target, pinhole, rate, way, goals)
         return FeatureServo(controller, target, pinhole, rate)
 
     def estimator_task(self, settings: VisualServoSettings) -> EstimatorTask:

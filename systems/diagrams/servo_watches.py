@@ -190,8 +190,6 @@ def add_servo_log(
         ports |= {name: block.GetOutputPort(name) for name in FAULTS if block.HasOutputPort(name)}
     if blocks.plan is not None:
         ports["X_WP_planned"] = servo.GetOutputPort("X_WP_planned")
-    if scenario.pose_plan is not None:
-        ports["X_WP_goal"] = servo.GetOutputPort("X_WP_goal")
     for name, other in zip(scenario.estimator.compare, blocks.compared, strict=True):
         ports[f"X_WP_{name}"] = other.GetOutputPort("X_WP")
     for sensor in scenario.sensors.log:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -185,7 +185,8 @@ class TensionControlSettings:
             simulator's integrator.
         world: What is round the robot; None: nothing. Contact needs the plant.
         stop_at_contact: Whether the first touch ends the simulation.
-        sections: Sections of a scenario, of which some push the platform. These need the plant.
+        sections: Sections of a scenario: some make controller or distributor, some push the
+            platform, which needs the plant.
         seed: Of their random numbers.
         damping: Of the simulated platform; by default the robot file's. It is in the dynamics that
             the controller believes unless `dynamics` says otherwise.
@@ -263,10 +264,13 @@ def add_tension_control(
     if real is None:
         real = in_plant.robot.cable_set().without_pulleys()
     believed = real if settings.believed_cables is None else settings.believed_cables
-    balance = settings.balance
+    robot, balance = in_plant.robot, settings.balance
     dynamics = settings.dynamics or platform_dynamics(
-        in_plant.robot, balance, damping=settings.damping.of(in_plant.robot)
+        robot, balance, damping=settings.damping.of(robot)
     )
+    settings = replace(settings, believed_cables=believed, dynamics=dynamics)
+    for section in settings.sections:
+        settings = replace(settings, **section.tension_blocks(settings, robot))
     control = settings.controller(
         in_plant, settings.trajectory, settings.gains, dynamics, balance=balance
     )
@@ -373,16 +377,13 @@ def build_tension_control(
     log = None
     if log_rate is not None:
         # `read_log` makes the rest from these; what is logged costs in the loop.
-        logged = {
-            "platform_state": blocks.state,
-            "desired_wrench": blocks.controller.GetOutputPort("desired_wrench"),
-        }
+        logged = {"platform_state": blocks.state}
+        for name in blocks.controller.logged():
+            logged[name] = blocks.controller.GetOutputPort(name)
         for name in ("tensions", "feasible", "failures"):
             logged[name] = blocks.distributor.GetOutputPort(name)
         if blocks.applied_wrench is not None:
             logged[APPLIED_WRENCH] = blocks.applied_wrench
-        for name in blocks.controller.logged:
-            logged[name] = blocks.controller.GetOutputPort(name)
         if meters is not None and meters.contact is not None:
             logged |= {name: meters.contact.GetOutputPort(name) for name in CONTACTS}
         log = add_log(builder, logged, log_rate)

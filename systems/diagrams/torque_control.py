@@ -97,24 +97,6 @@ def winch_group_refusals(scope: Scope) -> Iterator[Refusal]:
         yield "integration.integrator", found, accepted
 
 
-def plan_refusals(scope: Scope) -> Iterator[Refusal]:
-    """What contradicts a planned way to the pose that the camera asks for."""
-    scenario = scope.whole
-    if scenario.pose_plan is None:
-        return
-    for key in ("open_loop", "trajectory"):
-        if getattr(scenario, key) is not None:
-            yield key, "a section with pose_plan", "null"
-    if scenario.target.carrier != "world":
-        yield "target.carrier", f"{scenario.target.carrier} with pose_plan", "world"
-    if scenario.target.kind == "circles":
-        found = "circles, which do not tell a pose, with pose_plan"
-        yield "target.kind", found, "another kind"
-    if scenario.controller.free_rotation:
-        accepted = "false: all of the pose is controlled"
-        yield "controller.free_rotation", "true with pose_plan", accepted
-
-
 def tension_limits(scenario: Scenario, robot: Robot) -> tuple[float, float]:
     """Limits of tensions [N] that a run by torque is judged by, without the margin."""
     settings = scenario.torque_control or TorqueControl()

@@ -60,8 +60,6 @@ def _no_loop_reason(scenario: Any) -> str:
         return "its engine is the plant"
     if scenario.camera.kind != PROJECTED:
         return f"its camera is {scenario.camera.kind}"
-    if scenario.pose_plan is not None:
-        return "its plan of poses is a block of a diagram"
     if scenario.estimator.platform_tag is not None:
         return "a second camera looks at the platform"
     if scenario.tension_management is not None and scenario.tension_management.kind == IMAGE:

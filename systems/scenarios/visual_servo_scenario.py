@@ -12,7 +12,6 @@ from cdpr_drake.systems.cameras.camera_settings import CameraSettings
 from cdpr_drake.systems.cameras.targets import TargetSettings
 from cdpr_drake.systems.controllers.open_loop_servo import OpenLoopSettings
 from cdpr_drake.systems.controllers.perturbation_settings import Perturbations
-from cdpr_drake.systems.controllers.planned_pose_servo import PosePlanSettings
 from cdpr_drake.systems.controllers.servo_settings import (
     ControllerSettings,
     FeatureTrajectory,
@@ -53,11 +52,6 @@ class VisualServoSettings:
     open_loop: Annotated[
         OpenLoopSettings | None,
         "A planned motion of the platform instead of visual servoing; null: none.",
-    ] = None
-    pose_plan: Annotated[
-        PosePlanSettings | None,
-        "A planned way to the pose from which the target is seen as desired, instead of "
-        "visual servoing; null: none.",
     ] = None
     estimator: Annotated[EstimatorSettings, "The estimator."] = filled(EstimatorSettings)
     sensors: Annotated[SensorSuite, "Sensors."] = filled(SensorSuite)

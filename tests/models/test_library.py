@@ -1,6 +1,7 @@
 """Robots, cameras and sensors of the package: each hangs still, says its sources, is printed."""
 
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import yaml
 from pydrake.math import RigidTransform
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from cdpr_drake.errors import RobotFileError
+from cdpr_drake.errors import DataFileError, RobotFileError
 from cdpr_drake.geometry.poses import pose_error
 from cdpr_drake.geometry.straight_cables import gravity_wrench, wrench_matrix
 from cdpr_drake.models.camera_catalogue import load_camera
@@ -19,13 +20,20 @@ from cdpr_drake.models.mechanism_files import mechanism_names
 from cdpr_drake.models.robot_in_plant import platform_inertia
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.sensor_catalogue import (
+    depth_sensor_names,
     encoder_names,
+    inertial_sensor_names,
+    load_depth_sensor,
     load_encoder,
+    load_inertial_sensor,
     load_pose_sensor,
+    load_range_sensor,
     load_tension_sensor,
     pose_sensor_names,
+    range_sensor_names,
     tension_sensor_names,
 )
+from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.systems.robots.cable_robot import CableRobot, automatic_step
 from tests.models.formats.unusual_robots import made
 from tests.models.published_points import LARGE_ANCHORS
@@ -289,18 +297,26 @@ def test_the_tracker_is_fitted_to_what_is_reported_and_says_so():
 
 
 @pytest.mark.parametrize(
-    ("names", "load"),
+    ("names", "load", "change", "words"),
     [
-        (tension_sensor_names(), load_tension_sensor),
-        (encoder_names(), load_encoder),
-        (pose_sensor_names(), load_pose_sensor),
+        (tension_sensor_names, load_tension_sensor, {"limits": np.array([5.0, 5.0])},
+         r"limits: found \(5, 5\); accepted: smallest < largest"),
+        (encoder_names, load_encoder, None, ""),
+        (pose_sensor_names, load_pose_sensor, None, ""),
+        (inertial_sensor_names, load_inertial_sensor, None, ""),
+        (range_sensor_names, load_range_sensor, {"first_angle_deg": 300.0},
+         "first_angle_deg: found 300; accepted: <= last_angle_deg"),
+        (depth_sensor_names, load_depth_sensor, {"limits": np.array([5.0, 1.0])},
+         r"limits: found \(5, 1\); accepted: smallest < largest"),
     ],
-)
-def test_every_sensor_loads_and_names_itself(names, load):
-    assert names
-    for name in names:
+)  # fmt: skip
+def test_every_sensor_loads_and_names_itself_and_refuses_what_none_is(names, load, change, words):
+    for name in names():
         assert load(name).name == name
         assert load(name).source
+    if change:
+        with pytest.raises(DataFileError, match=words):
+            refuse(replace(load(names()[0]), **change))
 
 
 @pytest.mark.parametrize("top", ["cdpr_drake", "systems", "analyses", "notebooks", "README.md"])

@@ -165,26 +165,9 @@ def test_an_impossible_robot_is_refused_by_its_key(changes, found, accepted):
     assert re.fullmatch(rf"(:\d+)?: {pattern}", message)
 
 
-MASS_LINE = "  mass: 2.0"
-TEXTS = {
-    # The parser notices on the line after the one that is broken.
-    "no YAML": ("\n".join([*ROBOT.splitlines()[:3], "  mass: [2.0", *ROBOT.splitlines()[4:]]),
-                ":5: does not parse as YAML: "),
-    "empty": ("", ": found no mapping"),
-    "unknown key": (ROBOT.replace(MASS_LINE, "  mas: 2.0"),
-                    ":4: platform.mas: unknown key; did you mean mass?"),
-    "missing key": (ROBOT.replace(f"{MASS_LINE}\n", ""),
-                    ":4: platform.mass: missing; accepted: a number > 0 and <= 1e+07 [kg]"),
-    "key twice": (ROBOT.replace(MASS_LINE, f"{MASS_LINE}\n  mass: 3.0"),
-                  ":5: platform.mass: found twice"),
-    "line of a number": (ROBOT.replace("[0.2, 0.3, 0.1]", "[0.2, .nan, 0.1]"),
-                         ":5: platform.size[1]: found .nan; accepted: 3 numbers > 0 and"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(("text", "expected"), TEXTS.values(), ids=TEXTS)
-def test_a_text_that_is_no_robot_file_is_refused_with_its_line(text, expected):
-    assert expected in refusal(text)
+def test_an_unknown_key_is_refused_with_its_line():
+    words = ":4: platform.mas: unknown key; did you mean mass?"
+    assert words in refusal(ROBOT.replace("  mass: 2.0", "  mas: 2.0"))
 
 
 def test_all_problems_of_a_robot_are_said_at_once():
@@ -244,32 +227,16 @@ def test_a_good_file_loads_by_path(tmp_path):
 
 def test_what_a_file_leaves_out_gets_its_default():
     content = yaml.safe_load(ROBOT)
-    for section, key in (
-        ("platform", "center_of_mass"),
-        ("platform", "inertia"),
-        ("winch", "motor_torque"),
-        ("home", "angles_deg"),
-        ("frame", "beam"),
-    ):
-        del content[section][key]  # fmt: skip
+    del content["platform"]["center_of_mass"], content["platform"]["inertia"]
+    del content["winch"]["motor_torque"], content["home"]["angles_deg"], content["frame"]["beam"]
     del content["cameras"], content["title"]
     bare = parse_robot(yaml.safe_dump(content), Path("robot.yaml"))
-    assert bare.platform.inertia is None
-    assert bare.winch.motor_torque is None
-    assert bare.cameras == []
+    assert (bare.platform.inertia, bare.winch.motor_torque) == (None, None)
+    assert (bare.cameras, bare.title) == ([], "")
     # The middle of the box whose bottom face holds Po.
     np.testing.assert_allclose(bare.center_of_mass(), [0.0, 0.0, 0.05])
     np.testing.assert_array_equal(bare.home.angles_deg, np.zeros(3))
-    assert bare.title == ""
     assert bare.frame.beam_width() == 2.0 / 30.0
-
-
-def test_two_robots_do_not_share_arrays():
-    first, second = load_robot("planar"), load_robot("planar")
-    first.home.angles_deg[2] = 90.0
-    first.platform.size[0] = 9.0
-    assert second.home.angles_deg[2] == 0.0
-    assert second.platform.size[0] != 9.0
 
 
 @pytest.mark.parametrize("point", [[-1.0, 0.0, 2.0], [0.0, 0.0, 0.0]])

@@ -8,11 +8,7 @@ from pydrake.multibody.tree import SpatialInertia, default_model_instance
 from pydrake.systems.framework import DiagramBuilder
 
 from cdpr_drake.geometry.poses import pose_error, pose_from_angles, rotation_from_angles
-from cdpr_drake.models.robot_in_plant import (
-    add_robot,
-    platform_box,
-    platform_inertia,
-)
+from cdpr_drake.models.robot_in_plant import add_robot, platform_box, platform_inertia
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.systems.robots.cable_forces import CableForces
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS

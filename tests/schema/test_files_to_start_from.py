@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -13,6 +12,7 @@ import yaml
 
 from cdpr_drake import models
 from cdpr_drake.cli.app import main
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.systems import scenarios
 
 
@@ -77,9 +77,7 @@ def test_every_file_that_ships_is_accepted(kind, validators):
     ],
 )
 def test_what_the_loader_refuses_is_refused(keys, value, validators, tmp_path):
-    content = as_numbers(content_of(models.robot_file("acrobot_large")))
-    wrong = copy.deepcopy(content)
-    place = wrong
+    place = wrong = as_numbers(content_of(models.robot_file("acrobot_large")))
     for key in keys[:-1]:
         place = place[key]
     place[keys[-1]] = value
@@ -87,14 +85,8 @@ def test_what_the_loader_refuses_is_refused(keys, value, validators, tmp_path):
         validators["robot"].validate(wrong)
     path = tmp_path / "wrong.yaml"
     path.write_text(yaml.safe_dump(wrong))
-    with pytest.raises(models_error()):
+    with pytest.raises(RobotFileError):
         models.load_robot(str(path))
-
-
-def models_error():
-    from cdpr_drake.errors import RobotFileError
-
-    return RobotFileError
 
 
 @pytest.mark.parametrize("source", ["acrobot_large", "planar"])

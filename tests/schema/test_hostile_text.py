@@ -5,10 +5,12 @@ import re
 
 import pytest
 
-from cdpr_drake.errors import RobotFileError, plain_words
+from cdpr_drake.errors import RobotFileError, ScenarioError, plain_words
 from cdpr_drake.models.robot_loader import load_robot, robot_file
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.schema.yaml_files import MOST_DEPTH, YamlTextError, compose_yaml, load_yaml
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import scenario_kind
 
 BOMB = "a0: &a0 [x, x]\n" + "".join(
     f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 10)
@@ -82,24 +84,64 @@ def test_json_is_read_as_before():
         load_json(text, lambda word: (_ for _ in ()).throw(ValueError("Infinity")))
 
 
+def robot_with(folder, key, value):
+    """A shipped robot's file with the first line of a key replaced."""
+    text = robot_file("acrobot_small").read_text(encoding="utf-8")
+    text = re.sub(rf"(?m)^( *){key}: .*$", lambda m: f"{m[1]}{key}: {value}", text, count=1)
+    (folder / "robot.yaml").write_text(text, encoding="utf-8")
+    return str(folder / "robot.yaml")
+
+
 @pytest.mark.parametrize(
-    ("value", "words"),
+    ("key", "value", "words"),
     [
-        (r'"\e[31mred"', "accepted: no control characters"),
-        (r'"\x9b2J"', "accepted: no control characters"),
-        (r'"a\0b"', "accepted: no control characters"),
-        ("!!python/object/apply:os.system x", "found the tag !!python/object/apply:os.system"),
-        ("!!binary x", "found the tag !!binary; accepted"),
-        ("!mine x", "found the tag !mine; accepted"),
+        ("title", r'"\e[31mred"', "accepted: no control characters"),
+        ("title", r'"\x9b2J"', "accepted: no control characters"),
+        ("title", r'"a\0b"', "accepted: no control characters"),
+        (
+            "title",
+            "!!python/object/apply:os.system x",
+            "found the tag !!python/object/apply:os.sys",
+        ),
+        ("title", "!!binary x", "found the tag !!binary; accepted"),
+        ("mass", "1e25", "platform.mass: found 1e25; accepted: a number > 0 and <= 1e+07 [kg]"),
+        ("youngs_modulus", "1e25", "cable.youngs_modulus: found 1e25"),
+        ("beam", "50.0", "frame.beam: found 50; accepted: at most 1.2 [m], the frame's width"),
+        ("position", "[0, 0, 9]", "home.position: found (0, 0, 9); accepted: within the frame"),
     ],
 )
-def test_texts_that_control_a_terminal_or_have_a_tag_are_refused(value, words, tmp_path):
-    text = robot_file("acrobot_small").read_text()
-    path = tmp_path / "robot.yaml"
-    path.write_text(re.sub("(?m)^title: .*$", lambda _: f"title: {value}", text))
-    with pytest.raises(RobotFileError, match=words) as caught:
-        load_robot(path)
+def test_texts_and_numbers_that_no_robot_has_are_one_line(key, value, words, tmp_path):
+    with pytest.raises(RobotFileError, match=re.escape(words)) as caught:
+        load_robot(robot_with(tmp_path, key, value))
     assert plain_words(str(caught.value)).count("\n") == 0
-    good = 'title: "two\\nlines, caf\\u00e9"'
-    path.write_text(re.sub("(?m)^title: .*$", lambda _: good, text))
-    assert load_robot(path).title == "two\nlines, caf\u00e9"
+
+
+def test_lines_and_letters_of_any_language_are_text(tmp_path):
+    title = '"two\\nlines, caf\\u00e9"'
+    assert load_robot(robot_with(tmp_path, "title", title)).title == "two\nlines, caf\u00e9"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (BOMB, "found more than 100,000 keys and values"),
+        ("name: [" + "1, " * 700_000 + "1]", "found 2,100,009 bytes; accepted: at most 262,144"),
+        ("a: &a [*a]", "found an alias within what it names"),
+    ],
+    ids=["bomb", "long", "itself"],
+)
+def test_robots_and_scenarios_that_are_too_large_are_refused(content, words, tmp_path):
+    path = tmp_path / "large.yaml"
+    path.write_text(content, encoding="utf-8")
+    assert scenario_kind(str(path)) == "visual_servo"  # whose loader says what is wrong
+    for load, error in ((load_robot, RobotFileError), (load_scenario, ScenarioError)):
+        with pytest.raises(error, match=words) as caught:
+            load(str(path))
+        assert len(str(caught.value)) <= 500 + len(str(path))
+
+
+def test_a_bomb_on_the_command_line_is_refused():
+    words = "{" + BOMB.replace("\n", ", ") + "}"
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("acrobot_pbvs", [f"seed={words}", f"camera={words}"])
+    assert len(str(caught.value).splitlines()[0]) <= 500

@@ -1,20 +1,31 @@
 """A schema with one field of each kind, and files of it, for the tests of typed YAML."""
 
-# Annotations are not postponed here: Drake's YAML loader reads them.
-
 from typing import Annotated
 
 import numpy as np
 import pytest
 
 from cdpr_drake.errors import DataFileError
-from cdpr_drake.schema.declarations import In, OneOf, Switch, Text, filled, settings, values
+from cdpr_drake.schema.declarations import (
+    Direction,
+    In,
+    Name,
+    OneOf,
+    Switch,
+    Text,
+    filled,
+    settings,
+    values,
+)
 from cdpr_drake.schema.typed_yaml import load_typed
 
 
 @settings
 class Drum:
-    """A nested section that has defaults."""
+    """A section that has defaults.
+
+    It is round.
+    """
 
     radius: Annotated[float, In("m", gt=0.0), "Radius."] = 0.04
     turns: Annotated[int, In(ge=1), "Turns."] = 10
@@ -22,8 +33,6 @@ class Drum:
 
 @settings
 class Part:
-    """An item of a list."""
-
     label: Annotated[Text, "Label."]
     at: Annotated[np.ndarray, In("m", 3), "Place."] = values(0.0, 0.0, 0.0)
 
@@ -38,8 +47,15 @@ class Machine:
     torque: Annotated[float | None, In("N m"), "Torque."] = None
     size: Annotated[np.ndarray, In("m", 3, gt=0.0), "Edges."] = values(1.0, 1.0, 1.0)
     table: Annotated[np.ndarray, In("m", None, 2), "Table."] = values((0.0, 0.0))
+    axis: Annotated[Direction | None, "Axis."] = None
     kind: Annotated[str, OneOf(("small", "large")), "Kind."] = "small"
+    kinds: Annotated[list[str], OneOf(("a", "b")), "Kinds."] = filled(list)
+    title: Annotated[Text | None, "Title."] = None
+    file: Annotated[Name, "File."] = "a"
     enabled: Annotated[Switch, "Enabled."] = False
+    joints: Annotated[dict[str, np.ndarray], In("rad", None, single=True), "Joints."] = filled(dict)
+    packages: Annotated[dict[str, Text], "Packages."] = filled(dict)
+    drums: Annotated[dict[str, Drum], "Drums."] = filled(dict)
     drum: Annotated[Drum, "Drum."] = filled(Drum)
     brake: Annotated[Drum | None, "Brake."] = None
     parts: Annotated[list[Part], "Parts."] = filled(list)
@@ -56,9 +72,16 @@ table:
 - [1, 2]
 - [3, 4]
 - [5, 6]
+axis: [010, -2.5e-1, 0]
 kind: large
+kinds: [b, a]
+title: 12
+file: on
 enabled: true
-drum: {radius: 0.05, turns: 4}
+joints: {a: 1, b: [2, 3]}
+packages: {one: 1e3}
+drums: {first: {turns: 4}}
+drum: {radius: 0.05, turns: 1e1}
 brake:
   turns: 2
 parts:

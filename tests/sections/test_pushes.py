@@ -17,6 +17,7 @@ from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.schema.typed_yaml import refuse
 from cdpr_drake.sections.disturbances.section import Disturbances, DisturbanceSettings, Push
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.scenarios.files import TENSION_CONTROL
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sections import Section
@@ -130,6 +131,37 @@ def test_what_is_missing_or_of_another_kind_is_refused(words):
         refuse(two, "disturbances", error=ScenarioError)
 
 
+GUSTS = "disturbances={pushes: [{kind: wind, wind: [8, 0, 0], drag_area: 0.5, intensity: 0.2}]}"
+
+
+@pytest.mark.parametrize(
+    ("name", "quick"),
+    [
+        ("acrobot_pbvs", ["camera.kind=projected"]),
+        ("acrobot_pick_and_place", ["camera.kind=projected"]),
+        ("acrobot_computed_torque", []),
+    ],
+)
+def test_every_kind_of_run_is_pushed_by_the_gusts_of_its_seed(name, quick):
+    logs = {}
+    for key in ("seed=1", "seed=2", "disturbances=null"):
+        scenario = load_scenario(name, [*quick, "duration=0.05", "seed=1", GUSTS, key])
+        run = KINDS[scenario.kind](scenario).simulate()
+        logs[key] = run.log
+        forces = run.as_dict().get("disturbances" if scenario.kind != TENSION_CONTROL else "forces")
+        if key == "disturbances=null":
+            assert forces is None
+            continue
+        sizes = np.linalg.norm(run.log["applied_wrench"][:, 3:], axis=1)
+        assert forces["largest_force_n"] == pytest.approx(np.max(sizes))
+    still = logs["disturbances=null"]
+    assert "applied_wrench" not in still
+    blown, other = (logs[f"seed={seed}"]["applied_wrench"][:, 3] for seed in (1, 2))
+    assert blown[1] > 0.0
+    assert not np.any(blown[1:] == other[1:])
+    assert logs["seed=1"]["X_WP"][-1, 4] > still["X_WP"][-1, 4]
+
+
 # Sections of others.
 
 DRAG_OF_AIR = 3.0
@@ -191,7 +223,6 @@ def test_a_section_brakes_a_platform_by_its_velocity_and_another_pushes_beside_i
         np.testing.assert_allclose(each["applied_wrench"][5:-5, 3:], expected[5:-5], atol=SLOPES)
         assert np.all(each["applied_wrench"][:, :3] == 0.0)
     plain = run(load_scenario(name, [*quick, "log_rate=1000"])).simulate().log
-    assert "applied_wrench" not in plain
     assert np.max(np.abs(plain["X_WP"] - alone["X_WP"])) > 1e-9
 
 

@@ -191,8 +191,6 @@ class ForceTracking(PoseTracking):
     What it gathers it samples at the rate of control; the wrench follows the state at once.
     """
 
-    logged = (ESTIMATED, DISPLACEMENT)
-
     def __init__(
         self,
         in_plant: RobotInPlant,
@@ -259,6 +257,10 @@ class ForceTracking(PoseTracking):
         self.DeclareForcedDiscreteUpdateEvent(self._update)
         self.DeclareStateOutputPort(ESTIMATED, DiscreteStateIndex(self._outer))
         self.DeclareStateOutputPort(DISPLACEMENT, DiscreteStateIndex(self._moved))
+
+    def logged(self) -> tuple[str, ...]:
+        """As of `PoseTracking`, and what it estimates."""
+        return (*super().logged(), ESTIMATED, DISPLACEMENT)
 
     def _declare_memory(self) -> set[DependencyTicket]:
         """States on which the wrench depends, beside the platform's."""

@@ -51,7 +51,8 @@ finite) ends the run with outcome client_ended; what was simulated is written.
 
 The blocks in whose place the process outside stands are each the block that they replace, with the
 same ports, so that logs and figures stay. Where that would decide, they ask a `Remote`, which knows
-a `Driver` while a run is driven.
+a `Driver` while a run is driven. They offer it as `outside`, which is all that a run knows of it.
+`RemoteTensionLoop` does the same without a diagram, in compiled steps from instant to instant.
 
 Source: the interfaces of the Gazebo thesis, 3.5 and chapter 6: poses, set points and tensions as
 topics, tension distribution as a service.

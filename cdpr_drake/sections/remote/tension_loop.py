@@ -45,7 +45,8 @@ class RemoteTensionLoop(TensionRows):
 
     As `TensionLoop`, which is one compiled call from report to report, but a call from instant to
     instant, with the process outside in between. State, tensions and log are the diagram's to the
-    last bits; it asks at the same times.
+    last bits; it asks at the same times. Two counters in the compiled call keep its time: a `Clock`
+    as that of `ServoLoop` gives the same bits, but took 16 % more time without client's messages.
     """
 
     name = "remote"

@@ -105,12 +105,15 @@ class RemoteTracking(PoseTracking):
         }
         self.outside = Remote(place, inputs, outputs, resting[place])
         self._by_motion = place == TRAJECTORY
-        self.logged = ("desired_motion",) if self._by_motion else ()
         for name in ("tensions", "lengths"):
             self.DeclareVectorInputPort(name, len(robot.cables))
         state = self.GetInputPort("platform_state").get_index()
         needs = {self.time_ticket(), self.input_port_ticket(state)}
         self.DeclareVectorOutputPort("desired_motion", MOTION_SIZE, self._calc_motion, needs)
+
+    def logged(self) -> tuple[str, ...]:
+        """As of `PoseTracking`, and the desired motion where that is commanded."""
+        return (*super().logged(), *(["desired_motion"] if self._by_motion else []))
 
     def given_motion(self, time: float, read: Read) -> Array:
         """Desired motion at a time [s], shape (19,); `read` says what stands at outputs.

@@ -21,7 +21,7 @@ WRENCH_PARTS = (("force", "n", slice(3, 6)), ("moment", "nm", slice(0, 3)))
 
 
 def true_wrench(log: Mapping[str, Array]) -> Array:
-    """Wrench of the section `disturbances` on the platform, shape (n, 6) [N m, N]; else zeros."""
+    """Wrench that sections push the platform with, shape (n, 6) [N m, N]; zeros where none does."""
     if APPLIED_WRENCH in log:
         return np.asarray(log[APPLIED_WRENCH])
     return np.zeros_like(log[ESTIMATED])

@@ -6,11 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from pydrake.multibody.parsing import (
-    LoadModelDirectivesFromString,
-    Parser,
-    ProcessModelDirectives,
-)
+from pydrake.multibody.parsing import LoadModelDirectivesFromString, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder

@@ -21,17 +21,7 @@ from cdpr_drake.models.foreign_text import read_json
 from tests.messages import printed
 from tests.models.formats import foreign_files as files
 from tests.models.formats.foreign_files import ANCHORS, COM, EXITS, HOME, edited, saved, words
-from tests.models.formats.rich_files import (
-    MJCF,
-    SDF,
-    SITES,
-    SLIDER,
-    URDF,
-    hung,
-    joined,
-    slid,
-    urdf,
-)
+from tests.models.formats.rich_files import MJCF, SDF, SITES, SLIDER, URDF, hung, joined, slid, urdf
 from tests.models.formats.test_refusals import FIRST, MESH, SHELL, WHOLE, attachment, toy
 
 pytestmark = pytest.mark.usefixtures("in_this_process")

@@ -67,7 +67,7 @@ def test_the_front_door_has_no_other_question_about_a_robot():
     assert about_robots == set()
 
 
-TAKES = {"solve_static", "solve_tensions", "view", "add_mechanism"}
+TAKES = {"solve_static", "solve_tensions", "view", "add_mechanism", "load_robot_or_mechanism"}
 OTHERS = {"add_robot", "add_cable_robot", "add_camera", "add_visual_servo"}
 """Builders, which take no names but what `add_robot` or they themselves made; tested below."""
 

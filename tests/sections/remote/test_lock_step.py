@@ -81,9 +81,11 @@ def test_tension_control(inside, engine, place):
     assert run.outcome == Outcome.COMPLETED
     assert run.loop == ("diagram" if engine == "plant" else "remote")
     assert_same_log(run, inside[engine])
-    report = run.built.outside.report()
+    report = run.as_dict()["remote"]
     assert report["exchanges"] == (50 if place == "distributor" else 51)  # and the log's last row
     assert report["codec"] == codec
+    method = "client" if place == "distributor" else "barycenter"
+    assert run.subtitle().startswith(f"tensions by the {method}, ")
 
 
 def test_rows_of_the_log_between_control_steps():

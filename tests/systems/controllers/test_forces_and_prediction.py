@@ -100,9 +100,11 @@ def test_a_force_of_5_n_is_held_on_a_table_of_another_stiffness(wrong):
 
 def test_a_platform_that_is_led_by_hand_goes_where_it_is_led_and_stays():
     """Of a push F for a time T: F T / D, when it has come to rest."""
-    log = tension_run(LED, "duration=2.4").log
+    run = tension_run(LED, "duration=2.4")
+    log = run.log
     np.testing.assert_allclose(log["X_WP"][-1, 4], 6.0 * 1.5 / 60.0, rtol=0.02)
     np.testing.assert_allclose(log["displacement"][-1, 3], log["X_WP"][-1, 4], atol=1e-3)
+    assert {"displacement.x_m", "wrench_estimated.fx_n"} <= set(run.columns())
 
 
 def test_an_observer_holds_against_wind():
@@ -286,7 +288,9 @@ def test_foresight_stays_nearer_to_a_motion_that_the_cables_cannot_give():
 
 def test_a_scenario_runs_with_prediction():
     changes = ("predictive.steps=5", "controller.rate=100", "duration=1.0", "trajectory.pause=0.1")
-    log = tension_run("planar_computed_torque", *changes).log
+    run = tension_run("planar_computed_torque", *changes)
+    log = run.log
+    assert run.as_dict()["controller"] == "predictive"
     apart, _ = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
     assert np.max(apart) < 1e-3
     assert log["failures"][-1, 0] == 0.0

@@ -1,11 +1,10 @@
-"""Vision-based position control: a plan leads to where the camera sees the target as desired.
+"""Section `pose_plan` of a visual servo, and its block: vision-based position control.
 
-`PosePlanSettings` is the scenario section `pose_plan`: the platform moves to the pose that the
-camera asks for, instead of by its features.
+A plan leads to where the camera sees the target as desired, in the place of its features.
 """
 
-from collections.abc import Sequence
-from typing import Annotated
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Any
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -16,15 +15,55 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.control.planned_goal import GoalPlan, goal_offset, goal_pose
 from cdpr_drake.geometry.cable_paths import cable_jacobian
 from cdpr_drake.geometry.poses import pose_from_row, pose_row
-from cdpr_drake.schema.declarations import In, settings
+from cdpr_drake.schema.declarations import In, Refusal, Scope, settings
 from cdpr_drake.servoing.controller import ServoController
 from cdpr_drake.servoing.servo_law import saturation_share
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
+from cdpr_drake.systems.sections import Section
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
 TASK, BEGAN, DURATION = range(3)
 """Memory of a plan: number of its task, -1 before the first; when it began, and its T [s]."""
+
+
+@settings
+class PosePlanSettings(Section):
+    """The way of the platform to where it sees the target as desired: straight, quintic in time."""
+
+    words = (
+        "A planned way to the pose from which the target is seen as desired, instead of visual "
+        "servoing"
+    )
+
+    speed: Annotated[float, In("m/s", gt=0.0), "Largest speed of the platform."] = 0.15
+    rotation_speed_deg: Annotated[float, In("deg/s", gt=0.0), "Largest angular speed."] = 20.0
+    gain: Annotated[
+        float, In("1/s", gt=0.0), "Rate at which what is left fades at the end of the way."
+    ] = 2.0
+
+    def refusals(self, scope: Scope) -> Iterator[Refusal]:
+        """What contradicts a planned way to the pose that the camera asks for."""
+        scenario = scope.whole
+        for key in ("open_loop", "trajectory"):
+            if getattr(scenario, key) is not None:
+                yield f"/{key}", "a section with pose_plan", "null"
+        if scenario.target.carrier != "world":
+            yield "/target.carrier", f"{scenario.target.carrier} with pose_plan", "world"
+        if scenario.target.kind == "circles":
+            found = "circles, which do not tell a pose, with pose_plan"
+            yield "/target.kind", found, "another kind"
+        if scenario.controller.free_rotation:
+            accepted = "false: all of the pose is controlled"
+            yield "/controller.free_rotation", "true with pose_plan", accepted
+
+    def make_servo(self, model: Any, settings: Any) -> "PlannedPoseServo":
+        """A `PlannedPoseServo`."""
+        return PlannedPoseServo(
+            model.controller, model.target, model.pinhole, settings.controller.rate,
+            GoalPlan(self.speed, float(np.radians(self.rotation_speed_deg)), self.gain),
+            [task.desired.transform() for task in settings.tasks()],
+        )  # fmt: skip
 
 
 class PlannedPoseServo(FeatureServo):
@@ -67,6 +106,10 @@ class PlannedPoseServo(FeatureServo):
             {self.discrete_state_ticket(self._goal)},
         )  # fmt: skip
 
+    def logged(self) -> tuple[str, ...]:
+        """As of `FeatureServo`, and the goal."""
+        return (*super().logged(), "X_WP_goal")
+
     def _task(self, time: float) -> int:
         return int(np.searchsorted(self._begins, time, side="right")) - 1
 
@@ -108,18 +151,3 @@ class PlannedPoseServo(FeatureServo):
 
     def _calc_goal(self, context: Context, output: AbstractValue) -> None:
         output.set_value(pose_from_row(context.get_discrete_state(self._goal).value()))
-
-
-@settings
-class PosePlanSettings:
-    """The way of the platform to where it sees the target as desired: straight, quintic in time."""
-
-    speed: Annotated[float, In("m/s", gt=0.0), "Largest speed of the platform."] = 0.15
-    rotation_speed_deg: Annotated[float, In("deg/s", gt=0.0), "Largest angular speed."] = 20.0
-    gain: Annotated[
-        float, In("1/s", gt=0.0), "Rate at which what is left fades at the end of the way."
-    ] = 2.0
-
-    def plan(self) -> GoalPlan:
-        """The plan."""
-        return GoalPlan(self.speed, float(np.radians(self.rotation_speed_deg)), self.gain)
