@@ -28,7 +28,7 @@ LONG_WORK = {
         "cdpr_drake.analyses.runs.seeds.finished_jobs",
     ],
     "finish": ["cdpr_drake.analyses.runs.simulate.read_marker"],
-    "serve": ["cdpr_drake.analyses.runs.serve.Driver.wait"],
+    "serve": ["cdpr_drake.sections.remote.serve.Driver.wait"],
     "reactions": ["cdpr_drake.analyses.runs.run.Run.simulate"],
     "view": ["cdpr_drake.analyses.view.open_meshcat"],
     "studio": ["cdpr_drake.studio.server.serve"],
