@@ -40,8 +40,12 @@ SECTIONS = {
     "tension_control.force_control": "cdpr_drake.sections.force_control.section:ForceControl",
     "tension_control.predictive": "cdpr_drake.sections.predictive.section:PredictiveSettings",
 }
-"""Module and class of each section, by the place of its key in scenarios: `robot_scenario` is every
-kind but that of mechanisms. At a place, in the order in which they add their blocks."""
+"""Module and class of each section, by the place of its key in scenarios.
+
+Places are `visual_servo` and, within it, `camera` and `sensors`; `tension_control`; and
+`robot_scenario`, every kind but that of mechanisms. At a place sections stand in the order in which
+they add their blocks.
+"""
 
 GROUP = "cdpr_drake.sections"
 """Entry points of other packages' sections."""
@@ -178,6 +182,9 @@ class Section:
 
     def push(self, builder: DiagramBuilder, platform: Platform) -> OutputPort | None:
         """Adds what pushes the platform, in a scenario of any kind but a mechanism's.
+
+        In a visual servo it is called after `add_to` of all sections, so that a block which
+        `add_to` has added, and whose outputs are logged, may push.
 
         The engine compiled takes a wrench that follows the platform only from a state that its
         block samples; by the plant it may follow pose and state at once.

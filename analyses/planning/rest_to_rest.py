@@ -17,6 +17,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial, Trajectory
+from scipy.integrate import trapezoid
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import InfeasibleTensionError
@@ -116,7 +117,7 @@ def plan_rest_to_rest(
     states = np.hstack([places, rates, lengths]).T
     winding = np.gradient(states[6:], times, axis=1)
     # Of the straight motion, the integral has to be what the lengths change by.
-    winding += ((states[6:, -1] - states[6:, 0]) - np.trapezoid(winding, times))[:, None] / duration
+    winding += ((states[6:, -1] - states[6:, 0]) - trapezoid(winding, times))[:, None] / duration
     straight = PiecewisePolynomial.FirstOrderHold(times, winding)
 
     block = CableRobot(robot, CableRobotSettings(cables=settings))

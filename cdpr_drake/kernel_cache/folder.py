@@ -149,7 +149,10 @@ def state_of_sources() -> str:
     return hashed.hexdigest()[:12]
 
 
-_WITHOUT_KERNELS = ("models", "systems", "analyses", "cli", "studio", "kernel_cache", "__pycache__")
+_WITHOUT_KERNELS = (
+    "models", "systems", "analyses", "cli", "formats", "schema", "sections", "studio",
+    "kernel_cache", "__pycache__",
+)  # fmt: skip
 
 
 def _forget_old(folder: Path) -> None:

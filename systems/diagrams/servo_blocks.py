@@ -8,6 +8,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, OutputPort, Syste
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Integrator, MatrixGain
 
 from cdpr_drake.arrays import Array
+from cdpr_drake.errors import ScenarioError
 from cdpr_drake.systems.cameras.target_measurement import TargetMeasurement
 from cdpr_drake.systems.cameras.turning_camera import turning_camera
 from cdpr_drake.systems.controllers.feature_servo import FeatureServo
@@ -96,6 +97,7 @@ def add_visual_servo(
 
     Raises:
         RenderingError: The camera is rendered and EGL is missing.
+        ScenarioError: Two sections log a quantity of one name.
         VisualFeatureError: The target does not have what the scheme needs.
     """
     prefix = f"{name}_" if name else ""
@@ -174,8 +176,11 @@ def add_visual_servo(
         prefix=prefix,
     )
     sections = [section for _, section in sections_of(settings)]
-    for section in sections:
-        blocks.logged.update(section.add_to(builder, blocks, settings))
+    for key, section in sections_of(settings):
+        logged = section.add_to(builder, blocks, settings)
+        if twice := blocks.logged.keys() & logged.keys():
+            raise ScenarioError(f"{key}: logs {', '.join(sorted(twice))}, as another section does")
+        blocks.logged.update(logged)
     platform = Platform(
         robot=robot.robot, X_WP=robot.GetOutputPort("X_WP"),
         state=robot.GetOutputPort("platform_state"), seed=settings.seed, prefix=prefix,

@@ -137,6 +137,9 @@ def build_visual_servo(scenario: Scenario) -> VisualServo:
             f"{scenario.name}: kind: found {scenario.kind}; accepted: {VISUAL_SERVO}; "
             "cdpr_drake.simulate runs all kinds"
         )
+    for key, section in sections_of(scenario):
+        if section.needs_plant(scenario) and scenario.integration.engine == COMPILED:
+            raise ScenarioError(f"integration.engine: found compiled beside {key}; accepted: plant")
     robot = load_robot(scenario.robot)
     builder = DiagramBuilder()
     world = None if scenario.world is None else WorldInScene(scenario.world, robot)

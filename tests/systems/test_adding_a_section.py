@@ -1,6 +1,7 @@
 """Sections of scenarios: one by a subclass, as CONTRIBUTING.md says, and one of another package."""
 
 import logging
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
@@ -13,6 +14,7 @@ from cdpr_drake.errors import ScenarioError
 from cdpr_drake.schema.declarations import In, filled, settings
 from cdpr_drake.systems import sections
 from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.visual_servo import build_visual_servo
 from cdpr_drake.systems.loops.loop_choice import diagram_reason
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sections import Section, sections_at
@@ -66,6 +68,26 @@ class CountedScenario(Scenario):
     counter: Annotated[Counter, "A counter."] = filled(Counter)
 
 
+@settings
+class Twice(Counter):
+    """Logs what a counter does, and needs the plant."""
+
+    def add_to(self, builder, blocks, settings):
+        """Adds nothing."""
+        return {"count": blocks.servo.GetOutputPort("gain")}
+
+    def needs_plant(self, scenario):
+        """Always."""
+        return True
+
+
+@settings
+class CountedTwice(CountedScenario):
+    """A scenario with two sections that log under one name."""
+
+    twice: Annotated[Twice, "Another counter."] = filled(Twice)
+
+
 def load(*overrides):
     return load_scenario("acrobot_pbvs", [*QUICK, *overrides], schema=CountedScenario)
 
@@ -84,6 +106,17 @@ def test_a_section_refuses_by_its_own_key_and_by_others():
     assert "seed: found 13 beside a counter" in str(info.value)
     with pytest.raises(ScenarioError, match="counter"):
         load_scenario("acrobot_pbvs", [*QUICK, "counter.rate=100"])
+
+
+def test_two_sections_do_not_log_under_one_name_and_the_plant_is_asked_for():
+    scenario = load_scenario(
+        "acrobot_pbvs", [*QUICK, "counter.rate=100", "twice.rate=100"], schema=CountedTwice
+    )
+    with pytest.raises(ScenarioError, match="twice: logs count, as another section does"):
+        build_visual_servo(scenario)
+    compiled = replace(scenario, integration=replace(scenario.integration, engine="compiled"))
+    with pytest.raises(ScenarioError, match=r"integration\.engine: found compiled beside twice"):
+        build_visual_servo(compiled)
 
 
 def entries(**targets):
