@@ -1,15 +1,18 @@
-"""A folder with results in the page: verdicts, tables, numbers, figures, pages and files.
+"""Results of any command in the page: verdicts, tables, numbers, figures, pages and files.
 
-Any command's folder is shown so, whatever it has of these. Nothing in a file is run with the
-rights of the page: words are escaped, figures are images, pages are in a sandbox.
+`show_results(folder)` shows what a folder has of these, `View.of(data)` numbers alone. Nothing in a
+file is run with the rights of the page: words are escaped, figures are images, pages are in a
+sandbox.
 """
 
 from __future__ import annotations
 
 import base64
 import zipfile
-from collections.abc import Awaitable, Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -20,8 +23,14 @@ from nicegui import run, ui
 from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.errors import CdprError, OutputFolderError
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.panels.command_fields import CommandFields
+from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_rows, number_words, plain_table
-from cdpr_drake.studio.panels.panel import show_errors
+from cdpr_drake.studio.panels.panel import notify, show_errors
+from cdpr_drake.studio.workbench.command_board import CommandBoard, CommandEntry
+from cdpr_drake.studio.workbench.command_form import FieldProblem
+from cdpr_drake.studio.workbench.command_job import CommandJob
+from cdpr_drake.studio.workbench.job import JobState
 
 RESULTS = ("results.json", "summary.json")
 """Files that have a command's numbers; the first that is there."""
@@ -44,38 +53,49 @@ LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts; other verdicts are grey."""
 
+WHOLE = "max-width: 100%; background: white"
+"""Style of a figure that is as wide as the page."""
+
 BADGE = "white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem"
 
 Leaf = int | float | str | None
 
 
 @dataclass(frozen=True)
-class ResultFolder:
-    """What a command left in a folder.
+class View:
+    """What a page shows of results.
 
     Attributes:
-        folder: The folder.
         facts: Single numbers and words by what they are, with units.
         statements: Statements of a source with keys words, printed, found, verdict, why.
-        tables: Tables by title: headings, and rows of words.
-        files: All files here and one folder below, but hidden ones and links out of the folder.
+        tables: Headings and rows of words, by title.
+        folder: Their folder; None: there is none.
+        files: Its files here and one folder below, but hidden ones and links out of the folder.
     """
 
-    folder: Path
     facts: list[tuple[str, str]]
     statements: list[dict[str, str]]
     tables: dict[str, tuple[list[str], list[list[str]]]]
-    files: dict[str, Path]
+    folder: Path | None = None
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any], folder: Path | None = None) -> View:
+        """Of a command's numbers as JSON, and perhaps the files of its folder."""
+        tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
+        statements = [
+            {str(key): _words(value) for key, value in row.items()}
+            for row in tables.pop("statements", ())
+        ]
+        rest = {key: value for key, value in data.items() if key not in tables}
+        facts = [(name, _words(value)) for name, value in leaves(rest)]
+        shown = dict(_table(key, rows) for key, rows in tables.items())
+        return cls(facts, statements, shown, folder, {} if folder is None else _files(folder))
 
     @property
     def figures(self) -> dict[str, Path]:
         """Files that are shown as images."""
-        return {k: path for k, path in self.files.items() if path.suffix.lower() in FIGURES}
-
-    @property
-    def pages(self) -> dict[str, Path]:
-        """Files that are pages of their own, such as a replay."""
-        return {k: path for k, path in self.files.items() if path.suffix.lower() == ".html"}
+        return {name: path for name, path in self.files.items() if path.suffix.lower() in FIGURES}
 
     def remarks(self) -> str:
         """What limits the results, in words; empty: nothing."""
@@ -89,35 +109,65 @@ class ResultFolder:
         verdicts = [statement.get("verdict", "") for statement in self.statements]
         return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
 
+    def place(self) -> None:
+        """Places it into the current slot."""
+        if self.remarks():
+            ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
+        if self.statements:
+            html = _statements(self.statements)
+            ui.html(html, sanitize=False).classes("w-full").mark("statements")
+        tables = {title: plain_table(*table) for title, table in self.tables.items()}
+        if self.facts:
+            tables = {"Numbers": fact_rows(self.facts)} | tables
+        for title, html in tables.items():
+            with ui.expansion(title).classes("w-full studio-group"):
+                content = ui.html(html, sanitize=False).classes("w-full")
+                content.mark(f"table-{title.partition(',')[0].replace(' ', '-')}")
+        if self.figures:
+            self._place_figures()
+        for name, path in self.files.items():
+            if path.suffix.lower() == ".html":
+                _place_page(name, path)
+        if self.folder is not None:
+            everything = {**self.files, "All as a zip archive": self.folder}
+            with ui.expansion(f"Files, {len(self.files)}").classes("w-full studio-group"), ui.row():
+                for name, path in everything.items():
+                    button = ui.button(name, icon="download", on_click=partial(send_file, path))
+                    button.props("dense no-caps outline")
 
-def read_results(folder: Path) -> ResultFolder:
+    def _place_figures(self) -> None:
+        chosen = ui.select(list(self.figures), value=next(iter(self.figures)), label="figure")
+        chosen.props("dense outlined").classes("w-full").mark("figure")
+        place = ui.element("div").classes("w-full")
+
+        def show() -> None:
+            place.clear()
+            with place:
+                place_figure(self.figures[str(chosen.value)])
+
+        chosen.on_value_change(show)
+        show()
+
+
+def read_results(folder: Path) -> View:
     """Reads what a command left in a folder.
 
     Raises:
         CdprError: Its numbers cannot be read.
     """
     path = next((folder / name for name in RESULTS if (folder / name).is_file()), None)
-    data: Any = {}
-    if path is not None:
-        name = f"{folder.name}: {path.name}"
+    if path is None:
+        return View.of({}, folder)
+    name = f"{folder.name}: {path.name}"
+    try:
         if path.stat().st_size > LARGEST_RESULTS:
             raise CdprError(f"{name}: is larger than {LARGEST_RESULTS} bytes")
-        try:
-            data = load_json(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, RecursionError) as problem:
-            raise CdprError(f"{name}: cannot be read: {problem}") from problem
-        if not isinstance(data, dict):
-            raise CdprError(f"{name}: found no results of a command")
-    tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
-    statements = [
-        {str(key): _words(value) for key, value in row.items()}
-        for row in tables.pop("statements", ())
-    ]
-    rest = {key: value for key, value in data.items() if key not in tables}
-    return ResultFolder(
-        folder, [(name, _words(value)) for name, value in leaves(rest)], statements,
-        dict(_table(key, rows) for key, rows in tables.items()), _files(folder),
-    )  # fmt: skip
+        data = load_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise CdprError(f"{name}: cannot be read: {problem}") from problem
+    if not isinstance(data, dict):
+        raise CdprError(f"{name}: found no results of a command")
+    return View.of(data, folder)
 
 
 def leaves(
@@ -209,58 +259,17 @@ def zipped(folder: Path) -> bytes:
         raise OutputFolderError(f"{folder.name}: cannot be packed: {words}") from problem
 
 
-async def show_results(folder: Path) -> ResultFolder | None:
-    """Places what a command left in a folder into the current slot.
+async def show_results(folder: Path) -> None:
+    """Places what a command left in a folder into the current slot, which shows a sign meanwhile.
 
     It is read in another thread. What cannot be read is a message in the page.
-
-    Args:
-        folder: A results folder, of any command.
-
-    Returns:
-        What was read; None: it cannot be read, or the server is ending.
     """
+    sign = ui.spinner(size="lg")
     with show_errors():
-        results = await run.io_bound(read_results, folder)
-        if results is not None:
-            _place(results)
-        return results
-    return None
-
-
-def _place(results: ResultFolder) -> None:
-    if results.remarks():
-        words = f"These results: {results.remarks()}."
-        ui.label(words).classes("studio-soft").mark("results-remarks")
-    if results.statements:
-        html = _statements(results.statements)
-        ui.html(html, sanitize=False).classes("w-full").mark("statements")
-    for title, (heads, rows) in results.tables.items():
-        with ui.expansion(title).classes("w-full studio-group").mark("results-table"):
-            ui.html(plain_table(heads, rows), sanitize=False).classes("w-full")
-    if results.facts:
-        with ui.expansion("Numbers").classes("w-full studio-group"):
-            ui.html(fact_rows(results.facts), sanitize=False).classes("w-full").mark("numbers")
-    if results.figures:
-        figures = results.figures
-        chosen = ui.select(list(figures), value=next(iter(figures)), label="figure")
-        chosen.props("dense outlined").classes("w-full").mark("figure")
-        place = ui.element("div").classes("w-full")
-
-        def show() -> None:
-            place.clear()
-            with place:
-                place_figure(figures[str(chosen.value)], "max-width: 100%; background: white")
-
-        chosen.on_value_change(show)
-        show()
-    for name, path in results.pages.items():
-        with ui.expansion(f"Page {name}").classes("w-full studio-group") as fold:
-            _fill_once(fold, path)
-    with ui.expansion(f"Files, {len(results.files)}").classes("w-full studio-group"), ui.row():
-        for name, path in results.files.items():
-            download_button(name, path)
-        download_button("All as a zip archive", results.folder)
+        view = await run.io_bound(read_results, folder)
+        if view is not None:  # else the server is ending
+            view.place()
+    sign.delete()
 
 
 def _statements(statements: list[dict[str, str]]) -> str:
@@ -279,22 +288,27 @@ def _statements(statements: list[dict[str, str]]) -> str:
     return html
 
 
-def place_figure(path: Path, style: str) -> None:
+def place_figure(path: Path, style: str = WHOLE) -> None:
     """Places a figure as an image; nothing in it is run, whatever it is."""
-    words = escape(path.stem.replace("_", " "), quote=True)
-    kind = FIGURES[path.suffix.lower()]
+    place = ui.element("div").classes("w-full")
 
     async def fill() -> None:
-        data = base64.b64encode(await _shown(path)).decode("ascii")
-        if data:
-            image = f'<img src="data:{kind};base64,{data}" alt="{words}" style="{style}">'
-            ui.html(image, sanitize=False).mark("shown-figure")
+        with place, show_errors():
+            place_image(await _shown(path), path, style)
 
-    _soon(fill)
+    ui.timer(0.0, fill, once=True)
 
 
-def _fill_once(fold: ui.expansion, path: Path) -> None:
-    """Fills an expansion with a page when it is unfolded first.
+def place_image(data: bytes, path: Path, style: str = WHOLE) -> None:
+    """Places the data of a figure, whose type and words its path says."""
+    words = escape(path.stem.replace("_", " "), quote=True)
+    source = f"data:{FIGURES[path.suffix.lower()]};base64,{base64.b64encode(data).decode('ascii')}"
+    image = ui.html(f'<img src="{source}" alt="{words}" style="{style}">', sanitize=False)
+    image.classes("w-full").mark("shown-figure")
+
+
+def _place_page(name: str, path: Path) -> None:
+    """Places a page, which is filled when it is unfolded first.
 
     The sandbox lets it run, since a replay moves, but as of another origin than the studio.
     """
@@ -303,28 +317,14 @@ def _fill_once(fold: ui.expansion, path: Path) -> None:
         if fold.value and not place.default_slot.children:
             with place, show_errors():
                 page = (await _shown(path)).decode("utf-8", "replace")
-                frame = (
-                    ui.element("iframe")
-                    .mark("result-page")
-                    .classes("w-full")
-                    .style("height:70vh;border:0")
-                )
-                frame.props["srcdoc"], frame.props["title"] = page, path.name
+                frame = ui.element("iframe").classes("w-full").style("height:70vh;border:0")
+                frame.props["srcdoc"], frame.props["title"] = page, name
                 frame.props["sandbox"] = "allow-scripts"
+                frame.mark("result-page")
 
-    place = ui.element("div").classes("w-full")
-    fold.on_value_change(fill)
-
-
-def _soon(fill: Callable[[], Awaitable[None]]) -> None:
-    """Fills a new place in the current slot as soon as the page is sent."""
-    place = ui.element("div").classes("w-full")
-
-    async def begin() -> None:
-        with place, show_errors():
-            await fill()
-
-    ui.timer(0.0, begin, once=True)
+    with ui.expansion(f"Page {name}", on_value_change=fill).classes("w-full studio-group") as fold:
+        place = ui.element("div").classes("w-full")
+    fold.mark(f"page-{name}")
 
 
 async def _shown(path: Path) -> bytes:
@@ -342,15 +342,76 @@ async def _shown(path: Path) -> bytes:
     return await run.io_bound(read) or b""
 
 
-def download_button(words: str, path: Path) -> ui.button:
-    """Places a button that hands over a file, or a folder as a zip archive."""
+async def send_file(path: Path) -> None:
+    """Hands over a file to the browser, or a folder as a zip archive."""
+    with show_errors():
+        is_folder = path.is_dir()
+        data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
+        if data is not None:
+            ui.download(data, f"{path.name}.zip" if is_folder else path.name)
 
-    async def send() -> None:
-        with show_errors():
-            is_folder = path.is_dir()
-            data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
-            if data is not None:
-                ui.download(data, f"{path.name}.zip" if is_folder else path.name)
 
-    button = ui.button(words, icon="download", on_click=send)
-    return button.props("dense no-caps outline")
+class CommandResults:
+    """Which results of a command are shown, how far it is, and below that the results themselves.
+
+    Attributes:
+        bar: The results that there are, and the job.
+    """
+
+    def __init__(
+        self, board: CommandBoard, fields: CommandFields, label: str,
+        show: Callable[[Path], Awaitable[object]] = show_results,
+    ) -> None:  # fmt: skip
+        """Places it into the current slot.
+
+        Args:
+            board: What the session looks at.
+            fields: The form of the command, which says what the command refuses.
+            label: Of the list of results.
+            show: Places the results of a folder into the current slot.
+        """
+        self._board, self._fields, self._show = board, fields, show
+        self._job: CommandJob | None = None
+        self._shown: tuple[Path | None, float] = None, 0.0
+        self.bar = JobBar(board, label)
+        self._body = ui.element("div").classes("w-full").mark(f"{board.name}-shown")
+
+    def start(
+        self, name: str, words: Sequence[str], about: Mapping[str, str] | None = None
+    ) -> None:
+        """Begins the command, with the options of its form, if all of them are accepted.
+
+        Args:
+            name: Of the results folder.
+            words: Of the command, before its options.
+            about: Name and digest of the robot that it is about; None: no robot.
+        """
+        with show_errors(), suppress(FieldProblem):  # the field says it
+            self._job = self._board.start(name, [*words, *self._fields.arguments()], about)
+            self.bar.refresh()
+
+    async def tick(self) -> CommandEntry | None:
+        """Follows the job and its folder; returns what is shown."""
+        self.bar.refresh()
+        if self._job is not None and self._job.state.is_over:
+            job, self._job = self._job, None
+            key = self._fields.form.field_of(job.message)
+            if job.state == JobState.FAILED and not (key and self._fields.say(key, job.message)):
+                notify(job.message)
+        entry = self.bar.computed
+        whole = entry if entry is not None and entry.is_whole else None
+        stamp = (None, 0.0) if whole is None else (whole.folder, changed(whole.folder))
+        if stamp != self._shown:
+            self._shown = stamp
+            self._body.clear()
+            if whole is not None:
+                with self._body:
+                    await self._show(whole.folder)
+        return whole
+
+
+def changed(folder: Path) -> float:
+    """When the numbers in a folder were written, in seconds since 1970; 0: there are none."""
+    with suppress(OSError):
+        return max(path.stat().st_mtime for name in RESULTS if (path := folder / name).is_file())
+    return 0.0
