@@ -122,8 +122,9 @@ class _LogsPanel:
                 sign.delete()
             if read is not None and name == self._view.log:
                 contents, picture = read
-                place_image(picture, Path("columns of the log over time.png"))
-                contents.place()
+                with ui.expansion("What is in the log", value=True).classes("w-full studio-group"):
+                    place_image(picture, Path("columns of the log over time.png"))
+                    contents.place()
 
     def _start(self) -> None:
         with show_errors():

@@ -25,9 +25,6 @@ DASHES: dict[str, tuple[float, ...]] = {
 ROTATION = Look(ANGLE.color, DASHED)
 """Dashed, as both errors often are the same curve, each in its unit."""
 
-MOST_WAITING = 3000
-"""Rows that wait for a browser; a slower browser gets all rows of the run anew."""
-
 LONGEST_SILENCE = 5.0
 """Time after which a browser that does not answer gets rows again [s]."""
 
@@ -102,54 +99,34 @@ class MovingPlots(ui.element, component="plots.js"):
     def __init__(self, mounted: Callable[[], None]) -> None:
         """Without charts; `mounted` is called whenever a browser shows it anew, empty."""
         super().__init__()
-        self._waiting: list[Row] = []
         self._tokens = itertools.count(1)
         self._sent: int | None = None  # token of rows that are not drawn yet
-        self._sent_at, self._lag, self._replace = 0.0, FIRST_LAG, False
+        self._sent_at, self._lag = 0.0, FIRST_LAG
         self.on("drawn", self._drawn)
         self.on("mounted", lambda _: mounted())
 
     def begin(self, charts: Sequence[Chart], duration: float, rows: Sequence[Row]) -> None:
         """Shows other charts, with rows that are there already, of a run that lasts so long [s]."""
         self.run_method("begin", [chart.plain() for chart in charts], duration)
-        self.replace(rows)
+        self.put(rows)
 
-    def replace(self, rows: Sequence[Row]) -> None:
-        """Shows these rows instead of all others."""
-        self._waiting, self._replace, self._sent = list(rows), True, None
-        self.flush()
-
-    def append(self, rows: Sequence[Row]) -> bool:
-        """Adds rows; returns False if so many wait that all are better shown anew."""
-        self._waiting += rows
-        if len(self._waiting) > MOST_WAITING:
-            self._waiting = []
-            return False
-        self.flush()
-        return True
-
-    def flush(self) -> None:
-        """Sends the rows that wait, if the browser is ready."""
-        late = monotonic() - self._sent_at > LONGEST_SILENCE
-        if not (self._waiting or self._replace) or not (self.is_ready or late):
-            return
+    def put(self, rows: Sequence[Row]) -> None:
+        """Adds rows; to be called when the browser is ready for them."""
         self._sent, self._sent_at = next(self._tokens), monotonic()
-        self.run_method("put", self._waiting, self._sent, self._replace)
-        self._waiting, self._replace = [], False
+        self.run_method("put", rows, self._sent)
 
     @property
     def is_ready(self) -> bool:
-        """True if the browser has drawn all that it was sent."""
-        return self._sent is None
+        """True if the browser has drawn all that it was sent, or has been silent for long."""
+        return self._sent is None or monotonic() - self._sent_at > LONGEST_SILENCE
 
     @property
     def lag(self) -> float:
         """Longest recent time from sending rows to the answer that they are drawn [s]."""
-        return max(self._lag, 0.0 if self.is_ready else monotonic() - self._sent_at)
+        return max(self._lag, 0.0 if self._sent is None else monotonic() - self._sent_at)
 
     def _drawn(self, event: GenericEventArguments) -> None:
         args: Any = event.args
         if isinstance(args, dict) and args.get("token") == self._sent:
             self._sent = None
             self._lag = max(monotonic() - self._sent_at, FADES * self._lag)
-            self.flush()

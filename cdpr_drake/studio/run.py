@@ -76,7 +76,6 @@ class RunPanel:
         on_page(bench.robot.changed, self._robot_changed)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
-        ui.context.client.on_delete(self._watch.forget)
 
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):

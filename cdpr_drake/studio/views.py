@@ -14,14 +14,14 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from html import escape
+from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from nicegui import run, ui
 
 from cdpr_drake.analyses.logs.log import unit_of
-from cdpr_drake.errors import CdprError, OutputFolderError
+from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.panels.command_fields import CommandFields
 from cdpr_drake.studio.panels.job_bar import JobBar
@@ -37,9 +37,6 @@ RESULTS = ("results.json", "summary.json")
 
 FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
 """Types of the figures that a page shows, by their endings."""
-
-STORED = (".png", ".npz", ".mp4", ".zip", ".jpg")
-"""Endings of files that are small already."""
 
 MOST_ROWS, MOST_COLUMNS = 60, 12
 """Of a table that is shown; the file has all."""
@@ -59,6 +56,8 @@ WHOLE = "max-width: 100%; background: white"
 BADGE = "white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem"
 
 Leaf = int | float | str | None
+Words = tuple[list[str], list[list[str]]]
+"""Headings, and rows of words."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +74,7 @@ class View:
 
     facts: list[tuple[str, str]]
     statements: list[dict[str, str]]
-    tables: dict[str, tuple[list[str], list[list[str]]]]
+    tables: dict[str, Words]
     folder: Path | None = None
     files: Mapping[str, Path] = field(default_factory=dict)
 
@@ -205,14 +204,10 @@ def _rows(key: str, value: Any) -> list[Mapping[str, Any]]:
     return [{key: name, **row} for name, row in value.items()] if alike else []
 
 
-def _table(
-    key: str, rows: list[Mapping[str, Any]]
-) -> tuple[str, tuple[list[str], list[list[str]]]]:
-    shown, columns = rows[:MOST_ROWS], list(rows[0])
-    single = [name for name in columns if not isinstance(rows[0][name], list | dict)][:MOST_COLUMNS]
-    heads = [
-        f"{_plain(name)} [{unit}]" if (unit := unit_of(name)) else _plain(name) for name in single
-    ]
+def _table(key: str, rows: list[Mapping[str, Any]]) -> tuple[str, Words]:
+    single = [name for name, value in rows[0].items() if not isinstance(value, list | dict)]
+    single, shown = single[:MOST_COLUMNS], rows[:MOST_ROWS]
+    heads = [_plain(name) + (f" [{unit}]" if (unit := unit_of(name)) else "") for name in single]
     count = f"{len(rows)}" if len(shown) == len(rows) else f"the first {len(shown)} of {len(rows)}"
     cells = [[_words(row.get(name)) for name in single] for row in shown]
     return f"{_plain(key)}, {count} rows", (heads, cells)
@@ -237,26 +232,13 @@ def _files(folder: Path) -> dict[str, Path]:
 
 
 def zipped(folder: Path) -> bytes:
-    """All of a folder as a zip archive, below the folder's name, without links.
-
-    Raises:
-        OutputFolderError: The folder is not there, or cannot be read.
-    """
-    if not folder.is_dir():
-        raise OutputFolderError(f"{folder.name}: is not there any more")
-    try:
-        with TemporaryFile() as file:
-            with zipfile.ZipFile(file, "w") as archive:
-                for path in sorted(folder.rglob("*")):
-                    if not path.is_symlink() and path.is_file():
-                        small = path.suffix.lower() in STORED
-                        kind = zipfile.ZIP_STORED if small else zipfile.ZIP_DEFLATED
-                        archive.write(path, Path(folder.name) / path.relative_to(folder), kind)
-            file.seek(0)
-            return file.read()
-    except OSError as problem:
-        words = problem.strerror or problem
-        raise OutputFolderError(f"{folder.name}: cannot be packed: {words}") from problem
+    """All of a folder as a zip archive, below the folder's name, without links."""
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(folder.rglob("*")):
+            if not path.is_symlink() and path.is_file():
+                archive.write(path, Path(folder.name) / path.relative_to(folder))
+    return file.getvalue()
 
 
 async def show_results(folder: Path) -> None:
@@ -345,6 +327,8 @@ async def _shown(path: Path) -> bytes:
 async def send_file(path: Path) -> None:
     """Hands over a file to the browser, or a folder as a zip archive."""
     with show_errors():
+        if not path.exists():
+            raise CdprError(f"{path.name}: is not there any more")
         is_folder = path.is_dir()
         data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
         if data is not None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -18,7 +20,7 @@ from cdpr_drake.studio.panels.numbers import pair_table
 from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.plots import MovingPlots, charts_of, plot_row
 from cdpr_drake.studio.views import leaves, show_results
-from cdpr_drake.studio.workbench.job import JobState, Listener
+from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.result_subject import subject_of
 from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.workbench.run_job import RunJob
@@ -54,6 +56,8 @@ DIRECTIONS = {
 
 USUAL_FORCE, USUAL_TIME = 5.0, 0.3
 """Of a push [N], [s]."""
+
+READING = "reading the log"
 
 OF_THE_PROGRAM = ("versions", "wall_time_s", "realtime_factor")
 """Keys of a summary that say nothing about the run."""
@@ -126,12 +130,12 @@ class RunWatch:
         """Places it into the current slot."""
         self._board, self._scene = board, scene
         self.entry: RunEntry | None = None
-        self._listener: Listener | None = None
         self._finished: FinishedRun | None = None
         self._other: FinishedRun | None = None
-        self._reading, self._begun = "", False
+        self._unread: RunEntry | None = None  # whose log cannot be read
+        self._begun = False
         self._said: tuple[Any, ...] = ()
-        self._jpeg = b""
+        self._jpeg, self._time_sent = b"", -np.inf  # the newest that the browser has
         self._hands = _HandBar()
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as self._figure:
@@ -153,12 +157,11 @@ class RunWatch:
             self._slider.on_value_change(self._scrubbed)
         with ui.expansion("Both runs in numbers").classes("w-full studio-group") as self._both:
             self._pairs = ui.html("", sanitize=False).classes("w-full").mark("run-pairs")
-        with ui.expansion("Results, figures and files").classes(
-            "w-full studio-group"
-        ) as self._fold:
+        with ui.expansion("Results, figures and files") as self._fold:
             self._results = ui.element("div").classes("w-full")
         self._both.mark("both-runs")
-        self._fold.mark("run-results").on_value_change(self._fill_results)
+        self._fold.classes("w-full studio-group").mark("run-results")
+        self._fold.on_value_change(self._fill_results)
         self.show(None)
 
     @property
@@ -168,23 +171,14 @@ class RunWatch:
 
     def show(self, entry: RunEntry | None) -> None:
         """Shows another run; all of the one before is forgotten."""
-        self.forget()
-        self.entry, self._finished, self._said, self._jpeg = entry, None, (), b""
-        self._begun, self._reading, self._fold.value = False, "", False
+        self.entry, self._finished, self._said = entry, None, ()
+        self._fold.value = False
         self._results.clear()
         for element in (self._figure, self._key, self._scrub, self._fold):
             element.set_visibility(False)
-        if self.job is not None:
-            self._listener = self.job.listen()
         self._begin()
         self._say_pairs()
         self._say()
-
-    def forget(self) -> None:
-        """Listens no more."""
-        if self._listener is not None and self.job is not None:
-            self.job.forget(self._listener)
-        self._listener = None
 
     def show_span(self, seconds: float | None) -> None:
         """Shows the last seconds of plots only; None: all."""
@@ -199,10 +193,10 @@ class RunWatch:
         elif job is not None and job.header:
             charts = charts_of(job.header["cables"], job.header["limits"])
             end, samples = job.header["duration"], job.samples.all()
-            self._show_image(job.image)
         else:
             charts, end, samples = (), 0.0, ()
-        self._begun = bool(charts)
+        self._begun, self._jpeg = bool(charts), b""
+        self._time_sent = samples[-1]["t"] if samples else -np.inf
         self._plots.begin(charts, end, [plot_row(sample) for sample in samples])
         if done is not None:
             self._plots.run_method("cursor", self._board.cursor)
@@ -212,42 +206,38 @@ class RunWatch:
     def tick(self) -> None:
         """Shows what is new; to be called many times a second."""
         job, entry = self.job, self.entry
-        if job is not None and entry is not None and self._listener and self._finished is None:
-            self._follow(job, entry, self._listener)
-        self._plots.flush()
+        if job is not None and entry is not None and self._finished is None:
+            if not self._begun and job.header:
+                self._begin()
+            elif self._begun and self._plots.is_ready:
+                self._follow(job, entry)
         self._say()
 
-    def _follow(self, job: RunJob, entry: RunEntry, listener: Listener) -> None:
-        events = listener.take()
-        samples = [event.data for event in events if event.kind == "sample"]
-        if not self._begun and job.header:
-            self._begin()
-            samples = []  # they are among those of the job
-        self._jpeg = next((event.blob for event in events if event.kind == "image"), self._jpeg)
-        if self._plots.is_ready:
-            if samples:
-                wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE)
-                self._scene.draw(entry, samples[-1], wait)
-            self._show_image(self._jpeg)
-            self._jpeg = b""
-        if samples and not self._plots.append([plot_row(sample) for sample in samples]):
-            self._plots.replace([plot_row(sample) for sample in job.samples.all()])
+    def _follow(self, job: RunJob, entry: RunEntry) -> None:
+        """Shows the newest image, and samples that the browser does not have."""
+        if job.image is not self._jpeg:
+            self._jpeg = job.image
+            self._show_image(job.image)
+        samples = job.samples.all()
+        new = samples[bisect_right(samples, self._time_sent, key=itemgetter("t")) :]
+        if new:
+            self._time_sent = new[-1]["t"]
+            self._scene.draw(entry, new[-1], min(SCENE_SHARE * self._plots.lag, RAREST_SCENE))
+            self._plots.put([plot_row(sample) for sample in new])
 
     async def tick_slowly(self) -> None:
         """Reads the results once they are there, and follows jobs and other tabs."""
         entry, cursor = self.entry, self._board.cursor
         self._hands.refresh(self.job)
-        if entry is not None and self._finished is None and not self._reading:
+        if entry is not None and self._finished is None and entry is not self._unread:
             over = entry.job is None or entry.job.state.is_over
             self._fold.set_visibility(over and entry.folder.is_dir())
             if over and is_run(entry.folder):
-                self._reading = "reading the log"
-                done = None
                 try:
                     done = await run.io_bound(self._board.finished, entry.folder)
-                finally:
-                    if entry is self.entry:
-                        self._reading = "finished" if done else "cannot be read"
+                except Exception:
+                    self._unread = entry
+                    raise
                 if entry is self.entry and done is not None:
                     self._take_finished(done)
         elif self._finished is not None and cursor is not None and self._slider.value != cursor:
@@ -321,7 +311,10 @@ class RunWatch:
         job, done = self.job, self._finished
         summary = None if done is None else done.summary
         if job is None:
-            state = self._reading
+            state = (
+                "finished" if done else READING if self.entry is not self._unread else "unreadable"
+            )
+            state = "" if self.entry is None else state
             fraction, words, said, outcome = None, "", "", outcome_words(None, summary)
         else:
             (fraction, words), said = job.progress, job.message
@@ -334,7 +327,7 @@ class RunWatch:
         failed = job is not None and job.state == JobState.FAILED
         self._state.text, self._outcome.text = state, outcome.replace("_", " ")
         working = job is not None and not job.state.is_over
-        self._bar.visible = working or state == "reading the log"
+        self._bar.visible = working or state == READING
         self._bar.props(remove="indeterminate", add="indeterminate" if fraction is None else "")
         self._bar.value = fraction or 0.0
         self._words.text = words if failed else said or words

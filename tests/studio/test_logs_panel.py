@@ -11,8 +11,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.panels.logs import _views
-from cdpr_drake.studio.workbench.recorded_logs import log_contents, log_files, read_comparison
+from cdpr_drake.studio.logs import _views, log_contents, log_files, read_comparison
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, open_panel, problems, shown, until
 
@@ -44,12 +43,12 @@ def work(tmp_path_factory):
 
 
 def test_contents_are_those_of_the_front_door(work):
-    found, log = log_contents(work / "circle.csv"), import_log(work / "circle.csv")
-    assert dict(found.facts)["rows"] == log.rows_words()
-    assert "1 gaps" in dict(found.facts)["rows"]
-    assert [row[0] for row in found.columns] == list(log.frame)
-    assert [row[1] for row in found.columns][:2] == ["s", "m"]
-    assert found.picture.startswith(b"\x89PNG")
+    (view, picture), log = log_contents(work / "circle.csv"), import_log(work / "circle.csv")
+    assert dict(view.facts)["rows gaps"] == "1"
+    heads, rows = view.tables["columns, 16 rows"]
+    assert heads == ["columns", "rows", "least", "largest"]
+    assert [row[0] for row in rows] == list(log.frame)
+    assert picture.startswith(b"\x89PNG")
 
 
 def test_a_run_leaves_a_log_that_is_offered(work, alone, tmp_path):
@@ -59,13 +58,13 @@ def test_a_run_leaves_a_log_that_is_offered(work, alone, tmp_path):
 
 
 def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
-    found = read_comparison(beside)
-    assert found.robot == ROBOT
-    columns = 1 + sum(len(chart.series) for chart in found.charts)
-    assert all(len(row) == columns for row in found.rows)
+    charts, end, rows = read_comparison(beside)
+    columns = 1 + sum(len(chart.series) for chart in charts)
+    assert all(len(row) == columns for row in rows)
     table = np.genfromtxt(beside / "replay.csv", delimiter=",", names=True)
-    wanted = 1e3 * (table["C1_length_m"] - table["C1_predicted_length_m"])
-    assert [row[1] for row in found.rows] == pytest.approx(wanted)
+    offsets = 1e3 * (table["C1_length_m"] - table["C1_predicted_length_m"])
+    assert [row[1] for row in rows] == pytest.approx(offsets)
+    assert end == rows[-1][0] == table["time_s"][-1]
     broken = tmp_path / "broken"
     shutil.copytree(beside, broken)
     (broken / "replay.csv").write_text("time_s\n0\n")
@@ -77,8 +76,8 @@ async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, b
     open_panel(user, "logs")
     await until(lambda: shown(user, "logs-empty"))
     field(user, "log").value = "circle.csv"
-    await until(lambda: "1 gaps" in _content(user, "log-facts"))
-    assert "C8_length_m" in _content(user, "log-channels")
+    await until(lambda: "rows gaps</th><td>1<" in _content(user, "table-Numbers"))
+    assert "C8_length_m" in _content(user, "table-columns")
     user.find(marker="compare-log").click()
     await until(lambda: bench.results.subject("log") is not None)
     about = bench.results.subject("log")
@@ -86,7 +85,7 @@ async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, b
     name = _views[bench].board.shown
     told = json.loads((work / "logs" / name / "summary.json").read_text())
     assert told["cables"]["C1"]["length_offset_m"] == pytest.approx(OFFSET, abs=1e-6)
-    assert "<td>4</td>" in _content(user, "log-numbers")
+    await until(lambda: "C1</th><td>0.004<" in _content(user, "table-cables"))
 
 
 async def test_a_file_that_is_no_log_is_said(user):
