@@ -85,7 +85,7 @@ class _LogsPanel:
     """The panel in one tab of a browser."""
 
     def __init__(self, bench: Workbench, view: LogView) -> None:
-        self._bench, self._view = bench, view
+        self._bench, self._view, self._robot = bench, view, ""
         with ui.row().classes("w-full items-center no-wrap"):
             files = log_files(bench.folder)
             self._log = ui.select(files, label="log in the working folder", with_input=True)
@@ -99,7 +99,7 @@ class _LogsPanel:
             bench.commands["replay"], view.filled, FIRST,
             {"log-format": Choices([*DIALECTS, AUTO])}, bench.folder,
         )  # fmt: skip
-        self._results = CommandResults(view.board, fields, "comparisons", _show_comparison)
+        self._results = CommandResults(view.board, fields, "comparisons", self._show)
         self._say_empty()
         self._log.value = view.log or None
         ui.timer(TICK, self._tick)
@@ -139,9 +139,20 @@ class _LogsPanel:
             if files != self._log.options:
                 self._log.set_options(files, value=self._view.log or None)
             entry = await self._results.tick()
-            about = {} if entry is None else entry.about
-            subject = Subject(about.get("robot", ""), about.get("digest", ""))
-            self._bench.results.show(LOG, None if entry is None else subject)
+            digest = "" if entry is None else entry.about.get("digest", "")
+            subject = Subject(self._robot, digest) if entry is not None and self._robot else None
+            self._bench.results.show(LOG, subject)
+
+    async def _show(self, folder: Path) -> None:
+        self._robot = ""
+        with show_errors():
+            comparison = await run.io_bound(read_comparison, folder)
+            if comparison is None:  # the server is ending
+                return
+            self._robot, charts, end, rows = comparison
+            with ui.element("div").classes("w-full cdpr-run").mark("comparison"):
+                plots = MovingPlots(lambda: plots.begin(charts, end, rows))
+        await show_results(folder)
 
 
 def log_files(folder: WorkingFolder) -> list[str]:
@@ -162,32 +173,23 @@ def log_contents(path: Path) -> tuple[View, bytes]:
     return View.of(log.as_dict()), picture.getvalue()
 
 
-async def _show_comparison(folder: Path) -> None:
-    with show_errors():
-        comparison = await run.io_bound(read_comparison, folder)
-        if comparison is not None:  # else the server is ending
-            place = ui.element("div").classes("w-full cdpr-run").mark("comparison")
-            with place:
-                plots = MovingPlots(lambda: plots.begin(*comparison))
-    await show_results(folder)
-
-
 def is_comparison(folder: Path) -> bool:
     """True if a folder has what `cdpr replay` writes."""
     return all((folder / name).is_file() for name in (SUMMARY, TABLE))
 
 
-def read_comparison(folder: Path) -> tuple[list[Chart], float, list[Row]]:
-    """Charts of what `cdpr replay` wrote, measured and of the model, their last time [s], and rows.
+def read_comparison(folder: Path) -> tuple[str, list[Chart], float, list[Row]]:
+    """What `cdpr replay` wrote: the robot's name, charts of the log and the model, end [s], rows.
 
     Raises:
         OutputFolderError: There is none, or it cannot be read.
     """
     try:
-        cables = list(load_json((folder / SUMMARY).read_text(encoding="utf-8"))["cables"])
+        summary = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
         table = pd.read_csv(folder / TABLE)
         rows = np.unique(np.linspace(0, len(table) - 1, min(len(table), MOST_ROWS)).astype(int))
-        return _compared(cables, table.iloc[rows].astype(float))
+        curves = _compared(list(summary["cables"]), table.iloc[rows].astype(float))
+        return str(summary["robot"]), *curves
     except (OSError, ValueError, KeyError, IndexError) as problem:
         raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
 

@@ -396,6 +396,7 @@ class CommandResults:
 
 def changed(folder: Path) -> float:
     """When the numbers in a folder were written, in seconds since 1970; 0: there are none."""
+    paths = [path for name in RESULTS if (path := folder / name).is_file()]
     with suppress(OSError):
-        return max(path.stat().st_mtime for name in RESULTS if (path := folder / name).is_file())
+        return max((path.stat().st_mtime for path in paths), default=0.0)
     return 0.0

@@ -58,7 +58,8 @@ def test_a_run_leaves_a_log_that_is_offered(work, alone, tmp_path):
 
 
 def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
-    charts, end, rows = read_comparison(beside)
+    robot, charts, end, rows = read_comparison(beside)
+    assert robot == ROBOT
     columns = 1 + sum(len(chart.series) for chart in charts)
     assert all(len(row) == columns for row in rows)
     table = np.genfromtxt(beside / "replay.csv", delimiter=",", names=True)

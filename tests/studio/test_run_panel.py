@@ -87,8 +87,8 @@ async def test_a_second_tab_and_a_reload_find_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(3600)"))
     async with opened_panel(tmp_path) as (user, _):
         user.find(marker="start").click()
-        await until(lambda: says(user, "run-state", "running"))
+        await until(lambda: says(user, "run-state", "starting"))
         await user.open("/")
-        await until(lambda: says(user, "run-state", "running"))
+        await until(lambda: says(user, "run-state", "starting"))
         user.find(marker="stop").click()
         await until(lambda: says(user, "run-state", "stopped"))
