@@ -15,6 +15,9 @@ sessions share the server's jobs, so that a reload or a second tab loses no run.
   compiler; of several questions it answers the last.
 * `Subject` is the robot and pose that a result is about; the page says above each panel what is
   about another one.
+* `views` shows what any command left: numbers, verdicts, tables, figures, pages, files. `run`,
+  `logs` and `studies` are panels; `RunWatch` shows a run that goes on or is finished alike, with
+  `MovingPlots` of its samples or of the rows of its log (`FinishedRun`).
 * `SchemaGroups` makes forms from schemas. `PANELS` is the table of panels; `PanelPages` sends the
   page with the panel that is shown, and imports the others once the browser is there.
 

@@ -38,7 +38,7 @@ def main(picture=""):
             press(page, "Run")
             wait_for(page, "document.querySelector('.cdpr-field') !== null")
             press(page, "Start")
-            wait_for(page, "document.querySelector('.cdpr-state').innerText === 'runs'")
+            wait_for(page, "document.querySelector('.cdpr-state').innerText === 'running'")
             wait_for_start(page, f"{FRAMES}[1] > 20")
             found = {"with_scene": rate(page)}
             if picture:

@@ -15,7 +15,6 @@ from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
 from cdpr_drake.studio.workbench.command_job import CommandJob
-from cdpr_drake.studio.workbench.finished_studies import study_folder
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -151,25 +150,6 @@ def test_broken_results_are_one_message(tmp_path, words):
     (tmp_path / "results.json").write_text(words, encoding="latin-1")
     with pytest.raises(CdprError):
         read_regions(tmp_path)
-
-
-def test_a_study_has_verdicts_tables_and_figures(tmp_path):
-    statement = {"words": "w", "printed": "1", "found": "2", "verdict": "confirmed", "why": ""}
-    told = {
-        "study": "some", "quick": True, "wall_time_s": 1.25, "versions": {"a": "b"},
-        "statements": [statement, statement | {"verdict": "in part"}],
-        "runs": [{"seed": k, "summary": {"no": 1}} for k in range(100)],
-    }  # fmt: skip
-    (tmp_path / "results.json").write_text(json.dumps(told))
-    (tmp_path / "a.png").write_bytes(b"")
-    (tmp_path / "outside.png").symlink_to("/etc/hostname")
-    study = study_folder(tmp_path)
-    assert study.verdicts() == {"confirmed": 1, "in part": 1}
-    assert study.remarks() == "short form"
-    columns, rows, count = study.tables["runs"]
-    assert (columns, len(rows), count) == (["seed"], 60, 100)
-    assert study.facts == {"study": "some", "quick": "yes", "wall_time_s": "1.25"}
-    assert [figure.name for figure in study.figures] == ["a.png"]
 
 
 STEADY = """

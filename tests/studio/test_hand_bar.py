@@ -1,6 +1,6 @@
 """A cable that is broken and a platform that is pushed, by buttons, in a run that goes on."""
 
-from cdpr_drake.studio.panels.run import _boards
+from cdpr_drake.studio.run import _boards
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.studio.pages import field, opened_page, problems, shown, until
 from tests.studio.run_page import write_scenario

@@ -7,7 +7,7 @@ import sys
 import zipfile
 from contextlib import asynccontextmanager
 
-from cdpr_drake.studio.panels.run import run_panel
+from cdpr_drake.studio.run import run_panel
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.run_job import RunJob
@@ -87,8 +87,8 @@ async def test_a_second_tab_and_a_reload_find_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(3600)"))
     async with opened_panel(tmp_path) as (user, _):
         user.find(marker="start").click()
-        await until(lambda: says(user, "run-state", "runs"))
+        await until(lambda: says(user, "run-state", "starting"))
         await user.open("/")
-        await until(lambda: says(user, "run-state", "runs"))
+        await until(lambda: says(user, "run-state", "starting"))
         user.find(marker="stop").click()
         await until(lambda: says(user, "run-state", "stopped"))

@@ -1,12 +1,10 @@
-"""Two robots, and two runs, beside each other with their differences."""
-
-import json
+"""Two robots beside each other with their differences."""
 
 import pytest
 
 from cdpr_drake.analyses.tensions import solve_tensions
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side, runs_side_by_side
+from cdpr_drake.studio.workbench.side_by_side import robots_side_by_side
 
 
 def by_name(pairs):
@@ -32,13 +30,3 @@ def test_fields_that_differ_have_axes_units_and_differences():
     wanted = solve_tensions(one, one.home.transform(), method="quadratic_program")
     assert tension.one == pytest.approx(max(wanted.as_dict()["tensions_n"]))
     assert tension.difference > 0.5 * tension.one
-
-
-def test_a_run_beside_another_has_numbers_of_both(alone):
-    summary = json.loads((alone / "summary.json").read_text())
-    other = summary | {"final_position_error_m": summary["final_position_error_m"] + 0.01}
-    found = by_name(runs_side_by_side(summary, other))
-    assert found["final position error [m]"].difference == pytest.approx(0.01)
-    assert found["tension min [N]"].difference == 0.0
-    assert found["outcome"].one == summary["outcome"]
-    assert not any("wall time" in name or "drake" in name for name in found)

@@ -6,9 +6,9 @@ import shutil
 import pytest
 
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.panels.run import _boards, _scenes
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.panels.workspace import _views
+from cdpr_drake.studio.run import _boards, _scenes
 from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.studio.pages import field, open_panel, problems, shown, until
@@ -161,7 +161,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     bench.open("acrobot_large")
     await until(lambda: board.draft.settings() == ('robot="acrobot_large"',))
     assert board.draft.check().robot == "acrobot_large"
-    await until(lambda: says(f"in the place of the scenario's {ROBOT}"))
+    await until(lambda: says(f"instead of the scenario's {ROBOT}"))
     bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
     await until(lambda: says("save it"))
     user.find(marker="start").click()

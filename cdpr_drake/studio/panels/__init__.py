@@ -7,7 +7,6 @@
   shows what a handler raises as a message in the page. `SchemaGroups` is the form of a document,
   made from its schema: units, ranges, errors beside the fields. `cable_table` and `fact_table` are
   HTML, one element for many numbers.
-* Parts of the run panel: the scenario's form, plots that move, and what is looked at.
 """
 
 import lazy_loader

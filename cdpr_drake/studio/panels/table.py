@@ -28,12 +28,24 @@ PANELS = {
             "Run",
             "play_circle",
             {RUN: "The run that is shown", COMPARED: "The run behind it"},
-            f"{_ROOM}.run",
+            "cdpr_drake.studio.run",
             "run_panel",
         ),
-        Panel("logs", "Logs", "timeline", {LOG: "The comparison"}, f"{_ROOM}.logs", "logs_panel"),
         Panel(
-            "studies", "Studies", "science", {STUDY: "Studies"}, f"{_ROOM}.studies", "studies_panel"
+            "logs",
+            "Logs",
+            "timeline",
+            {LOG: "The comparison"},
+            "cdpr_drake.studio.logs",
+            "logs_panel",
+        ),
+        Panel(
+            "studies",
+            "Studies",
+            "science",
+            {STUDY: "Studies"},
+            "cdpr_drake.studio.studies",
+            "studies_panel",
         ),
     )
 }

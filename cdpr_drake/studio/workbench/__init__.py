@@ -18,11 +18,10 @@ call every job and the manager.
 Commands: a `CommandForm` says which options a command takes; the command line makes it from its own
 functions, so that there is no second list of them. `CommandBoard` starts commands in the working
 folder, each as a job. `Regions` are workspaces that were computed, as solids and planes for the
-scene; `StudyFolder` is what a study left.
+scene.
 
-Runs: `ScenarioDraft` is a scenario with changed fields, checked as `cdpr simulate` does.
-`FinishedRun` is the results folder of a run, to be looked at from row to row; `RunScene` draws a
-run into Meshcat. Live samples and the rows of a log become the same rows of plots.
+Runs: `ScenarioDraft` is a scenario with changed fields, checked as `cdpr simulate` does. `RunScene`
+draws a run into Meshcat.
 """
 
 import lazy_loader

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.studio.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.command_job import CommandJob
-from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ScenarioDraft

@@ -1,4 +1,4 @@
-"""Two robots or two runs in numbers: what each has, and by how much they differ."""
+"""Two robots in numbers: what each has, and by how much they differ."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
@@ -17,9 +16,6 @@ from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 Value = float | str | None
 
 AXES = "xyz"
-
-OF_THE_PROGRAM = ("versions", "wall_time_s", "realtime_factor")
-"""Keys of a summary that say nothing about the run."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +50,6 @@ def robots_side_by_side(one: Robot, other: Robot) -> list[Pair]:
     fields = _pairs(dict(_fields(Robot, one, "")), dict(_fields(Robot, other, "")))
     home = _pairs(_at_home(one), _at_home(other))
     return [*(pair for pair in fields if pair.differs), *home]
-
-
-def runs_side_by_side(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Pair]:
-    """Numbers and words of two summaries of runs, those that both have none of left out."""
-    pairs = _pairs(dict(_leaves(one, "")), dict(_leaves(other, "")))
-    return [pair for pair in pairs if pair.one is not None or pair.other is not None]
 
 
 def _pairs(one: Mapping[str, Value], other: Mapping[str, Value]) -> list[Pair]:
@@ -107,19 +97,3 @@ def _at_home(robot: Robot) -> dict[str, Value]:
     found["at home: capacity margin [N]"] = answer.capacity_margin
     found["at home: clearance [m]"] = answer.clearance
     return {name: value for name, value in found.items() if value is not None}
-
-
-def _leaves(value: Mapping[str, Any], before: str, unit: str = "") -> Iterator[tuple[str, Value]]:
-    """Numbers and words of a summary; the unit of what is inside stands in the key above."""
-    for key, inner in value.items():
-        if key in OF_THE_PROGRAM:
-            continue
-        mine = unit_of(key) or unit
-        stem = key.rpartition("_")[0] if unit_of(key) else key
-        words = f"{before} {stem.replace('_', ' ')}".strip()
-        if isinstance(inner, Mapping):
-            yield from _leaves(inner, words, mine)
-        elif isinstance(inner, bool | str) or inner is None:
-            yield words, None if inner is None or inner == "" else str(inner)
-        elif isinstance(inner, int | float):
-            yield f"{words} [{mine}]" if mine else words, float(inner)

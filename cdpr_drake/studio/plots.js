@@ -61,8 +61,7 @@ export default {
       this.cursorTime = null;
       this.$nextTick(() => this.plan());
     },
-    put(rows, token, replace) {
-      if (replace) this.rows = [];
+    put(rows, token) {
       for (const row of rows) this.rows.push(row);
       this.token = token;
       this.plan();

@@ -1,16 +1,15 @@
-"""The results of a run, as they are looked at and handed over."""
+"""The results of a run, as they are looked at and compared."""
 
-import io
 import json
 import shutil
-import zipfile
 
 import numpy as np
 import pytest
 
 from cdpr_drake.errors import OutputFolderError
-from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run, zipped
-from cdpr_drake.studio.workbench.plot_rows import charts_of, plot_row
+from cdpr_drake.studio.finished_run import FinishedRun, is_run
+from cdpr_drake.studio.plots import charts_of, plot_row
+from cdpr_drake.studio.watch import run_pairs
 
 
 def test_rows_are_those_of_the_log(alone):
@@ -43,15 +42,11 @@ def test_what_is_no_run_is_refused(alone, tmp_path):
         FinishedRun(broken)
 
 
-def test_the_archive_has_every_file_and_follows_no_link(alone, tmp_path):
-    folder = tmp_path / "short"
-    shutil.copytree(alone, folder)
-    (folder / "elsewhere").symlink_to("/etc/hostname")
-    file = io.BytesIO()
-    zipped(folder, file)
-    with zipfile.ZipFile(file) as archive:
-        files = {path.name for path in alone.iterdir()}
-        assert {f"short/{name}" for name in files} == set(archive.namelist())
-        assert archive.read("short/log.csv") == (alone / "log.csv").read_bytes()
-    with pytest.raises(OutputFolderError, match="not there any more"):
-        zipped(tmp_path / "gone", file)
+def test_a_run_beside_another_has_numbers_of_both(alone):
+    summary = json.loads((alone / "summary.json").read_text())
+    other = summary | {"final_position_error_m": summary["final_position_error_m"] + 0.01}
+    pairs = {pair.name: pair for pair in run_pairs(summary, other)}
+    assert pairs["final position error [m]"].difference == pytest.approx(0.01)
+    assert pairs["tension min [N]"].difference == 0.0
+    assert pairs["outcome"].one == summary["outcome"]
+    assert not any("wall time" in name or "drake" in name for name in pairs)

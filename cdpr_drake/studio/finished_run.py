@@ -1,14 +1,15 @@
-"""The results folder of a run, to be looked at from row to row, and any folder as one file."""
+"""The results folder of a run, to be looked at from row to row."""
 
 from __future__ import annotations
 
 import zipfile
 import zlib
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
+from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import OutputFolderError
@@ -27,7 +28,7 @@ LOG, SUMMARY, SCENARIO = "log.npz", "summary.json", "scenario.yaml"
 
 
 def is_run(folder: Path) -> bool:
-    """Whether a folder has the results of a run."""
+    """True if a folder has the results of a run."""
     return all((folder / name).is_file() for name in (LOG, SUMMARY, SCENARIO))
 
 
@@ -40,6 +41,7 @@ class FinishedRun:
         summary: Its summary.
         cables: Names of the cables.
         limits: Smallest and largest tension [N].
+        times: Of the rows, shape (n,) [s].
         samples: Rows of its log, as a run shows them, at most `MOST_ROWS`.
     """
 
@@ -65,92 +67,47 @@ class FinishedRun:
             self._model = servo_model(self.scenario, robot)
             self._picture = MarksPicture(self._model)
         try:
-            summary: dict[str, Any] = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
+            self.summary: dict[str, Any] = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
             with np.load(folder / LOG, allow_pickle=False) as log:
                 count = len(log["time"])
                 rows = np.unique(np.linspace(0, count - 1, min(count, MOST_ROWS)).astype(int))
-                self._log = {name: log[name][rows] for name in self._needed(log.files)}
+                self._log = {name: log[name][rows] for name in self._columns(log.files)}
+            self.times: Array = self._log["time"]
             self.samples = self._samples()
         except (OSError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as problem:
             raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
-        self.summary = summary
-
-    @property
-    def times(self) -> Array:
-        """Of the rows, shape (n,) [s]."""
-        return self._log["time"]
 
     def row_at(self, time: float) -> int:
         """The row nearest to a time [s]."""
         return int(np.argmin(np.abs(self.times - time)))
 
     def image(self, row: int) -> bytes:
-        """What the camera saw, drawn from the marks of the log, as JPEG; empty: no camera."""
+        """The camera's image, drawn from the marks of the log, as JPEG; empty: no camera."""
         if self._model is None:
             return b""
-        found = self._log["found"][row, 0] > 0.0
-        marks = self._log[f"{self._model.target.mark}_px"][row] if found else None
-        return self._picture.jpeg(marks, None)
+        marks = self._log[f"{self._model.target.mark}_px"][row]
+        return self._picture.jpeg(marks if self._log["found"][row, 0] > 0.0 else None, None)
 
-    def _needed(self, there: list[str]) -> list[str]:
+    def _columns(self, present: list[str]) -> list[str]:
         names = ["time", "X_WP", "tensions", "lengths"]
-        names += [name for name in ("unstrained_lengths", "X_WP_desired") if name in there]
-        if self._model is not None:
-            names += ["found", f"{self._model.target.mark}_px"]
-        return names
+        names += [name for name in ("unstrained_lengths", "X_WP_desired") if name in present]
+        return names if self._model is None else [*names, "found", f"{self._model.target.mark}_px"]
 
     def _samples(self) -> list[dict[str, Any]]:
         log, model = self._log, self._model
         if model is None:
             distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
         else:
-            pairs = zip(log["X_WP"], log["time"], strict=True)
+            pairs = zip(log["X_WP"], self.times, strict=True)
             errors = [model.seen_error(pose_from_row(pose), float(time)) for pose, time in pairs]
             distance, angle = np.array(errors).reshape(-1, 2).T
-        unstrained = log.get("unstrained_lengths")
-        return [
-            {
-                "t": float(log["time"][k]),
-                "position_error": _finite(distance[k]),
-                "rotation_error": _finite(angle[k]),
-                "tensions": [_finite(value) for value in log["tensions"][k]],
-                "lengths": [_finite(value) for value in log["lengths"][k]],
-                "unstrained": None if unstrained is None else unstrained[k].tolist(),
-                "pose": log["X_WP"][k].tolist(),
-            }
-            for k in range(len(log["time"]))
-        ]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
-STORED = frozenset({".png", ".npz", ".mp4", ".zip", ".jpg"})
-"""Endings of files that are small already."""
-
-
-def zipped(folder: Path, file: IO[bytes]) -> None:
-    """Writes all of a folder into a zip archive, below the folder's name.
-
-    Links are left out: what they lead to may lie anywhere.
-
-    Raises:
-        OutputFolderError: The folder is not there, or the disk is full.
-    """
-    if not folder.is_dir():
-        raise OutputFolderError(f"{folder.name}: is not there any more")
-    try:
-        with zipfile.ZipFile(file, "w") as archive:
-            for path in sorted(folder.rglob("*")):
-                if path.is_symlink() or not path.is_file():
-                    continue
-                small = path.suffix.lower() in STORED
-                archive.write(
-                    path, Path(folder.name) / path.relative_to(folder),
-                    zipfile.ZIP_STORED if small else zipfile.ZIP_DEFLATED,
-                )  # fmt: skip
-    except OSError as problem:
-        raise OutputFolderError(
-            f"{folder.name}: cannot be packed: {problem.strerror or problem}"
-        ) from problem
+        columns = {
+            "t": self.times, "position_error": distance, "rotation_error": angle,
+            "tensions": log["tensions"], "lengths": log["lengths"],
+            "unstrained": log.get("unstrained_lengths"), "pose": log["X_WP"],
+        }  # fmt: skip
+        present = {name: values.tolist() for name, values in columns.items() if values is not None}
+        rows = (
+            {name: values[k] for name, values in present.items()} for k in range(len(self.times))
+        )
+        return [{"unstrained": None, **finite(sample)} for sample in rows]

@@ -1,0 +1,402 @@
+"""Results of any command in the page: verdicts, tables, numbers, figures, pages and files.
+
+`show_results(folder)` shows what a folder has of these, `View.of(data)` numbers alone. Nothing in a
+file is run with the rights of the page: words are escaped, figures are images, pages are in a
+sandbox.
+"""
+
+from __future__ import annotations
+
+import base64
+import zipfile
+from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import partial
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from nicegui import run, ui
+
+from cdpr_drake.analyses.logs.log import unit_of
+from cdpr_drake.errors import CdprError
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.panels.command_fields import CommandFields
+from cdpr_drake.studio.panels.job_bar import JobBar
+from cdpr_drake.studio.panels.numbers import fact_rows, number_words, plain_table
+from cdpr_drake.studio.panels.panel import notify, show_errors
+from cdpr_drake.studio.workbench.command_board import CommandBoard, CommandEntry
+from cdpr_drake.studio.workbench.command_form import FieldProblem
+from cdpr_drake.studio.workbench.command_job import CommandJob
+from cdpr_drake.studio.workbench.job import JobState
+
+RESULTS = ("results.json", "summary.json")
+"""Files that have a command's numbers; the first that is there."""
+
+FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
+"""Types of the figures that a page shows, by their endings."""
+
+MOST_ROWS, MOST_COLUMNS = 60, 12
+"""Of a table that is shown; the file has all."""
+
+MOST_FILES = 200
+"""Files that are listed."""
+
+LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
+"""Sizes of numbers that are read, and of a figure or page that is shown [bytes]."""
+
+SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
+"""Behind the words of verdicts; other verdicts are grey."""
+
+WHOLE = "max-width: 100%; background: white"
+"""Style of a figure that is as wide as the page."""
+
+BADGE = "white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem"
+
+Leaf = int | float | str | None
+Words = tuple[list[str], list[list[str]]]
+"""Headings, and rows of words."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What a page shows of results.
+
+    Attributes:
+        facts: Single numbers and words by what they are, with units.
+        statements: Statements of a source with keys words, printed, found, verdict, why.
+        tables: Headings and rows of words, by title.
+        folder: Their folder; None: there is none.
+        files: Its files here and one folder below, but hidden ones and links out of the folder.
+    """
+
+    facts: list[tuple[str, str]]
+    statements: list[dict[str, str]]
+    tables: dict[str, Words]
+    folder: Path | None = None
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any], folder: Path | None = None) -> View:
+        """Of a command's numbers as JSON, and perhaps the files of its folder."""
+        tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
+        statements = [
+            {str(key): _words(value) for key, value in row.items()}
+            for row in tables.pop("statements", ())
+        ]
+        rest = {key: value for key, value in data.items() if key not in tables}
+        facts = [(name, _words(value)) for name, value in leaves(rest)]
+        shown = dict(_table(key, rows) for key, rows in tables.items())
+        return cls(facts, statements, shown, folder, {} if folder is None else _files(folder))
+
+    @property
+    def figures(self) -> dict[str, Path]:
+        """Files that are shown as images."""
+        return {name: path for name, path in self.files.items() if path.suffix.lower() in FIGURES}
+
+    def remarks(self) -> str:
+        """What limits the results, in words; empty: nothing."""
+        words = {"interrupted": "stopped before its end", "quick": "short form"}
+        return ", ".join(
+            words[name] for name, value in self.facts if name in words and value == "yes"
+        )
+
+    def verdicts(self) -> str:
+        """How many statements got each verdict; empty: there are none."""
+        verdicts = [statement.get("verdict", "") for statement in self.statements]
+        return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
+
+    def place(self) -> None:
+        """Places it into the current slot."""
+        if self.remarks():
+            ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
+        if self.statements:
+            html = _statements(self.statements)
+            ui.html(html, sanitize=False).classes("w-full").mark("statements")
+        tables = {title: plain_table(*table) for title, table in self.tables.items()}
+        if self.facts:
+            tables = {"Numbers": fact_rows(self.facts)} | tables
+        for title, html in tables.items():
+            with ui.expansion(title).classes("w-full studio-group"):
+                content = ui.html(html, sanitize=False).classes("w-full")
+                content.mark(f"table-{title.partition(',')[0].replace(' ', '-')}")
+        if self.figures:
+            self._place_figures()
+        for name, path in self.files.items():
+            if path.suffix.lower() == ".html":
+                _place_page(name, path)
+        if self.folder is not None:
+            everything = {**self.files, "All as a zip archive": self.folder}
+            with ui.expansion(f"Files, {len(self.files)}").classes("w-full studio-group"), ui.row():
+                for name, path in everything.items():
+                    button = ui.button(name, icon="download", on_click=partial(send_file, path))
+                    button.props("dense no-caps outline")
+
+    def _place_figures(self) -> None:
+        chosen = ui.select(list(self.figures), value=next(iter(self.figures)), label="figure")
+        chosen.props("dense outlined").classes("w-full").mark("figure")
+        place = ui.element("div").classes("w-full")
+
+        def show() -> None:
+            place.clear()
+            with place:
+                place_figure(self.figures[str(chosen.value)])
+
+        chosen.on_value_change(show)
+        show()
+
+
+def read_results(folder: Path) -> View:
+    """Reads what a command left in a folder.
+
+    Raises:
+        CdprError: Its numbers cannot be read.
+    """
+    path = next((folder / name for name in RESULTS if (folder / name).is_file()), None)
+    if path is None:
+        return View.of({}, folder)
+    name = f"{folder.name}: {path.name}"
+    try:
+        if path.stat().st_size > LARGEST_RESULTS:
+            raise CdprError(f"{name}: is larger than {LARGEST_RESULTS} bytes")
+        data = load_json(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise CdprError(f"{name}: cannot be read: {problem}") from problem
+    if not isinstance(data, dict):
+        raise CdprError(f"{name}: found no results of a command")
+    return View.of(data, folder)
+
+
+def leaves(
+    value: Mapping[str, Any], before: str = "", unit: str = ""
+) -> Iterator[tuple[str, Leaf]]:
+    """Numbers and words of a command's results, each by its name with the unit of its key."""
+    for key, inner in value.items():
+        mine = unit_of(key) or unit
+        words = f"{before} {_plain(key)}".strip()
+        if isinstance(inner, Mapping):
+            yield from leaves(inner, words, mine)
+        elif isinstance(inner, bool | str) or inner is None:
+            yield words, None if inner in (None, "") else _words(inner)
+        elif isinstance(inner, int | float):
+            yield f"{words} [{mine}]" if mine else words, inner
+        elif inner and not any(isinstance(one, Mapping | list) for one in inner[:MOST_COLUMNS]):
+            yield f"{words} [{mine}]" if mine else words, ", ".join(map(_words, inner))
+
+
+def _plain(key: str) -> str:
+    """A key without its unit, in words."""
+    return (key.rpartition("_")[0] if unit_of(key) else key).replace("_", " ")
+
+
+def _rows(key: str, value: Any) -> list[Mapping[str, Any]]:
+    """The rows of a table: a list of things, or things of the same kind by their names."""
+    if isinstance(value, list):
+        return value if all(isinstance(row, dict) for row in value) else []
+    if not isinstance(value, dict) or len(value) < 2:
+        return []
+    first, *others = value.values()
+    alike = isinstance(first, dict) and all(
+        isinstance(row, dict) and row.keys() == first.keys() for row in others
+    )
+    return [{key: name, **row} for name, row in value.items()] if alike else []
+
+
+def _table(key: str, rows: list[Mapping[str, Any]]) -> tuple[str, Words]:
+    single = [name for name, value in rows[0].items() if not isinstance(value, list | dict)]
+    single, shown = single[:MOST_COLUMNS], rows[:MOST_ROWS]
+    heads = [_plain(name) + (f" [{unit}]" if (unit := unit_of(name)) else "") for name in single]
+    count = f"{len(rows)}" if len(shown) == len(rows) else f"the first {len(shown)} of {len(rows)}"
+    cells = [[_words(row.get(name)) for name in single] for row in shown]
+    return f"{_plain(key)}, {count} rows", (heads, cells)
+
+
+def _words(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float) or value is None:
+        return number_words(value)
+    return str(value)[:400]
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    root = folder.resolve()
+    paths = [
+        path for pattern in ("*", "*/*") for path in sorted(folder.glob(pattern))
+        if path.is_file() and path.resolve().is_relative_to(root)
+        and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+    ]  # fmt: skip
+    return {path.relative_to(folder).as_posix(): path for path in paths[:MOST_FILES]}
+
+
+def zipped(folder: Path) -> bytes:
+    """All of a folder as a zip archive, below the folder's name, without links."""
+    file = BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(folder.rglob("*")):
+            if not path.is_symlink() and path.is_file():
+                archive.write(path, Path(folder.name) / path.relative_to(folder))
+    return file.getvalue()
+
+
+async def show_results(folder: Path) -> None:
+    """Places what a command left in a folder into the current slot, which shows a sign meanwhile.
+
+    It is read in another thread. What cannot be read is a message in the page.
+    """
+    sign = ui.spinner(size="lg")
+    with show_errors():
+        view = await run.io_bound(read_results, folder)
+        if view is not None:  # else the server is ending
+            view.place()
+    sign.delete()
+
+
+def _statements(statements: list[dict[str, str]]) -> str:
+    """Verdicts in their colours, in front of what they are about."""
+    heads = ("verdict", "the source says", "printed", "found", "remark")
+    rows = [
+        [row.get(key, "") for key in ("verdict", "words", "printed", "found", "why")]
+        for row in statements
+    ]
+    html = plain_table(heads, rows)
+    for verdict in {row[0] for row in rows}:
+        cell, words = '<th scope="row">', escape(verdict)
+        shade = SHADES.get(verdict, "#606060")
+        badge = f'<b style="{BADGE};background:{shade}">{words}</b>'
+        html = html.replace(f"{cell}{words}</th>", f"{cell}{badge}</th>")
+    return html
+
+
+def place_figure(path: Path, style: str = WHOLE) -> None:
+    """Places a figure as an image; nothing in it is run, whatever it is."""
+    place = ui.element("div").classes("w-full")
+
+    async def fill() -> None:
+        with place, show_errors():
+            place_image(await _shown(path), path, style)
+
+    ui.timer(0.0, fill, once=True)
+
+
+def place_image(data: bytes, path: Path, style: str = WHOLE) -> None:
+    """Places the data of a figure, whose type and words its path says."""
+    words = escape(path.stem.replace("_", " "), quote=True)
+    source = f"data:{FIGURES[path.suffix.lower()]};base64,{base64.b64encode(data).decode('ascii')}"
+    image = ui.html(f'<img src="{source}" alt="{words}" style="{style}">', sanitize=False)
+    image.classes("w-full").mark("shown-figure")
+
+
+def _place_page(name: str, path: Path) -> None:
+    """Places a page, which is filled when it is unfolded first.
+
+    The sandbox lets it run, since a replay moves, but as of another origin than the studio.
+    """
+
+    async def fill() -> None:
+        if fold.value and not place.default_slot.children:
+            with place, show_errors():
+                page = (await _shown(path)).decode("utf-8", "replace")
+                frame = ui.element("iframe").classes("w-full").style("height:70vh;border:0")
+                frame.props["srcdoc"], frame.props["title"] = page, name
+                frame.props["sandbox"] = "allow-scripts"
+                frame.mark("result-page")
+
+    with ui.expansion(f"Page {name}", on_value_change=fill).classes("w-full studio-group") as fold:
+        place = ui.element("div").classes("w-full")
+    fold.mark(f"page-{name}")
+
+
+async def _shown(path: Path) -> bytes:
+    """A file, read in another thread; empty: the server is ending.
+
+    Raises:
+        CdprError: It is too large for a page.
+    """
+
+    def read() -> bytes:
+        if path.stat().st_size > LARGEST_SHOWN:
+            raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
+        return path.read_bytes()
+
+    return await run.io_bound(read) or b""
+
+
+async def send_file(path: Path) -> None:
+    """Hands over a file to the browser, or a folder as a zip archive."""
+    with show_errors():
+        if not path.exists():
+            raise CdprError(f"{path.name}: is not there any more")
+        is_folder = path.is_dir()
+        data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
+        if data is not None:
+            ui.download(data, f"{path.name}.zip" if is_folder else path.name)
+
+
+class CommandResults:
+    """Which results of a command are shown, how far it is, and below that the results themselves.
+
+    Attributes:
+        bar: The results that there are, and the job.
+    """
+
+    def __init__(
+        self, board: CommandBoard, fields: CommandFields, label: str,
+        show: Callable[[Path], Awaitable[object]] = show_results,
+    ) -> None:  # fmt: skip
+        """Places it into the current slot.
+
+        Args:
+            board: What the session looks at.
+            fields: The form of the command, which says what the command refuses.
+            label: Of the list of results.
+            show: Places the results of a folder into the current slot.
+        """
+        self._board, self._fields, self._show = board, fields, show
+        self._job: CommandJob | None = None
+        self._shown: tuple[Path | None, float] = None, 0.0
+        self.bar = JobBar(board, label)
+        self._body = ui.element("div").classes("w-full").mark(f"{board.name}-shown")
+
+    def start(
+        self, name: str, words: Sequence[str], about: Mapping[str, str] | None = None
+    ) -> None:
+        """Begins the command, with the options of its form, if all of them are accepted.
+
+        Args:
+            name: Of the results folder.
+            words: Of the command, before its options.
+            about: Name and digest of the robot that it is about; None: no robot.
+        """
+        with show_errors(), suppress(FieldProblem):  # the field says it
+            self._job = self._board.start(name, [*words, *self._fields.arguments()], about)
+            self.bar.refresh()
+
+    async def tick(self) -> CommandEntry | None:
+        """Follows the job and its folder; returns what is shown."""
+        self.bar.refresh()
+        if self._job is not None and self._job.state.is_over:
+            job, self._job = self._job, None
+            key = self._fields.form.field_of(job.message)
+            if job.state == JobState.FAILED and not (key and self._fields.say(key, job.message)):
+                notify(job.message)
+        entry = self.bar.computed
+        whole = entry if entry is not None and entry.is_whole else None
+        stamp = (None, 0.0) if whole is None else (whole.folder, changed(whole.folder))
+        if stamp != self._shown:
+            self._shown = stamp
+            self._body.clear()
+            if whole is not None:
+                with self._body:
+                    await self._show(whole.folder)
+        return whole
+
+
+def changed(folder: Path) -> float:
+    """When the numbers in a folder were written, in seconds since 1970; 0: there are none."""
+    paths = [path for name in RESULTS if (path := folder / name).is_file()]
+    with suppress(OSError):
+        return max((path.stat().st_mtime for path in paths), default=0.0)
+    return 0.0
