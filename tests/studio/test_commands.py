@@ -12,12 +12,10 @@ from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.studio.workbench.command_board import CommandBoard
+from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.jobs import CommandJob, JobManager, JobState
 from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
-from cdpr_drake.studio.workbench.command_job import CommandJob
 from cdpr_drake.studio.workbench.finished_studies import study_folder
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.workspace_regions import (
     PLANE,

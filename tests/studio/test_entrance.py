@@ -10,7 +10,7 @@ from nicegui import core
 from nicegui.testing.user_simulation import user_simulation
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.studio.entrance import Entrance
+from cdpr_drake.studio.door import Entrance
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.server import _put_before_all

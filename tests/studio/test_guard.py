@@ -5,8 +5,7 @@ import asyncio
 import pytest
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.entrance import Entrance, is_token
-from cdpr_drake.studio.guard import SESSION, Guard
+from cdpr_drake.studio.door import SESSION, Entrance, Guard, is_token
 from cdpr_drake.studio.server import StudioOptions, serve
 
 TOKEN = "secret-token-of-a-test"

@@ -6,8 +6,7 @@ from urllib.request import HTTPCookieProcessor, build_opener
 
 from nicegui import ElementFilter
 
-from cdpr_drake.studio.panels.panel import Panel
-from cdpr_drake.studio.panels.table import PANELS
+from cdpr_drake.studio.panel import PANELS, Panel
 from tests.studio.pages import opened_page
 
 LATER = (
@@ -24,7 +23,7 @@ ONE_OF_EACH = ("undo", "coordinate-2", "start-workspace", "start", "log", "studi
 IMPORTED = """
 import sys
 import cdpr_drake.studio.server
-from cdpr_drake.studio.panels.table import PANELS
+from cdpr_drake.studio.panel import PANELS
 PANELS["robot"].load()
 print(*sorted(sys.modules))
 """

@@ -6,10 +6,10 @@ import shutil
 import pytest
 
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.panels.run import _boards, _scenes
-from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.panels.workspace import _views
-from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
+from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.studio.pages import field, open_panel, problems, shown, until
 

@@ -8,9 +8,9 @@ import numpy as np
 from nicegui import ui
 
 from cdpr_drake.analyses.runs.steering import BREAK, PUSH
-from cdpr_drake.studio.panels.panel import notify, show_errors
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import notify, show_errors
+from cdpr_drake.studio.run_job import RunJob
 
 DIRECTIONS = {
     f"{sign}{axis}": tuple(float(value) for value in factor * np.eye(3)[k])

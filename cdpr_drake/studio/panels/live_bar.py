@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import show_errors
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.run_board import RunBoard
-from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.boards import RunBoard
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import show_errors
+from cdpr_drake.studio.run_job import RunJob
 
 AS_FAST = "as fast as possible"
 SPEEDS: dict[str, float | None] = {

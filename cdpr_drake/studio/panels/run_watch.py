@@ -11,14 +11,14 @@ from typing import Any
 
 from nicegui import run, ui
 
+from cdpr_drake.studio.boards import RunBoard, RunEntry, outcome_words
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import show_errors
 from cdpr_drake.studio.panels.moving_plots import MovingPlots, Row
 from cdpr_drake.studio.panels.numbers import pair_table
-from cdpr_drake.studio.panels.panel import show_errors
+from cdpr_drake.studio.run_job import Listener, RunJob
 from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
-from cdpr_drake.studio.workbench.job import JobState, Listener
 from cdpr_drake.studio.workbench.plot_rows import charts_of, plot_row
-from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry, outcome_words
-from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.side_by_side import runs_side_by_side
 
 STATES = {

@@ -10,12 +10,12 @@ from weakref import WeakKeyDictionary
 from nicegui import run, ui
 
 from cdpr_drake.analyses.studies.study import STUDIES
+from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.job_bar import JobBar
+from cdpr_drake.studio.panel import STUDY, notify, show_errors
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
-from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_table
-from cdpr_drake.studio.panels.panel import notify, show_errors
-from cdpr_drake.studio.panels.result_names import STUDY
-from cdpr_drake.studio.workbench.command_board import CommandBoard
+from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.finished_studies import (
     STUDY_RESULTS,
@@ -23,7 +23,6 @@ from cdpr_drake.studio.workbench.finished_studies import (
     study_folder,
     study_folders,
 )
-from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5

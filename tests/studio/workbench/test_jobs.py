@@ -8,11 +8,16 @@ import time
 
 import pytest
 
-from cdpr_drake.studio.workbench.command_job import CommandJob
-from cdpr_drake.studio.workbench.job import MOST_EVENTS, Event, JobError, JobState
-from cdpr_drake.studio.workbench.job_manager import JobManager
-from cdpr_drake.studio.workbench.job_process import progress_of
-from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.jobs import (
+    MOST_EVENTS,
+    CommandJob,
+    Event,
+    JobError,
+    JobManager,
+    JobState,
+    progress_of,
+)
+from cdpr_drake.studio.run_job import RunJob
 from tests.studio.conftest import RUN_SETTINGS
 
 LONGEST = 1200.0
