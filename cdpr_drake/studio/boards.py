@@ -88,7 +88,8 @@ class Entry(Left, Generic[J]):
         return None
 
 
-CommandEntry, RunEntry = Entry[Job], Entry[RunJob]
+CommandEntry = Entry[Job]
+RunEntry = Entry[RunJob]
 
 
 class Board(Generic[J]):

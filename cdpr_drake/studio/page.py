@@ -119,9 +119,8 @@ def _place_busy_sign(bench: Workbench) -> None:
         words = ui.label()
 
     def refresh() -> None:
-        said = (
-            "computing" if bench.calculator.is_late else "job at work" if bench.jobs.is_busy else ""
-        )
+        works = "job at work" if bench.jobs.is_busy else ""
+        said = "computing" if bench.calculator.is_late else works
         words.text = said or words.text
         sign.set_visibility(bool(said))
 

@@ -51,7 +51,7 @@ class Panel:
     def load(self) -> Callable[[Workbench], None]:
         """Imports what the panel needs; returns its function."""
         module, _, function = self.place.partition(":")
-        return getattr(import_module(f"cdpr_drake.studio.{module}"), function)  # type: ignore[no-any-return]
+        return getattr(import_module(f"cdpr_drake.studio.{module}"), function)
 
 
 PANELS = {

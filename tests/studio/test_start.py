@@ -49,7 +49,7 @@ def test_the_page_has_the_panel_that_is_shown_and_no_other(studio):
 
 
 async def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(tmp_path, monkeypatch):
-    broken = Panel("pose", "Pose", "open_with", {}, "cdpr_drake.studio.panels.no_such", "none")
+    broken = Panel("Pose", "open_with", "panels.no_such:none", {})
     monkeypatch.setitem(PANELS, "pose", broken)
     async with opened_page(tmp_path) as (user, _, _):
         with user:

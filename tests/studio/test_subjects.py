@@ -25,14 +25,14 @@ async def workspaces(user, bench):
 
 
 async def run(user, bench):
-    await until(lambda: "folder first" in field(user, "run").options)
-    field(user, "run").value = "folder first"
+    await until(lambda: "first" in field(user, "run").options)
+    field(user, "run").value = "first"
     await until(lambda: bench.results.subject("run") is not None)
 
 
 async def compared(user, bench):
-    await until(lambda: "folder second" in field(user, "compare").options)
-    field(user, "compare").value = "folder second"
+    await until(lambda: "second" in field(user, "compare").options)
+    field(user, "compare").value = "second"
     await until(lambda: bench.results.subject("compared") is not None)
 
 
