@@ -152,7 +152,7 @@ JOB = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
 from pathlib import Path
-from cdpr_drake.studio.workbench.command_job import CommandJob
+from cdpr_drake.studio.jobs import CommandJob
 job = CommandJob("a job", sys.argv[2:], Path.cwd())
 job.begin()
 Path(sys.argv[1]).write_text(str(job.process_id))

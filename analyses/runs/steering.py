@@ -124,16 +124,34 @@ class Message:
     blob: bytes = b""
 
 
+def pieces(message: Message) -> list[bytes]:
+    """A message as bytes, in which numbers that are not finite become null."""
+    head = {"kind": message.kind, "blob": len(message.blob), **message.data}
+    text = json.dumps(finite(head), allow_nan=False).encode()
+    return [text, message.blob] if message.blob else [text]
+
+
+def head_of(piece: bytes) -> tuple[Message, bool]:
+    """What the first piece of a message says, and whether its blob follows.
+
+    Raises:
+        ValueError: That was no message.
+    """
+    head = load_json(piece)
+    if not isinstance(head, dict) or not isinstance(head.get("kind"), str):
+        raise ValueError("found no kind in a message")
+    kind, size = head.pop("kind"), head.pop("blob", 0)
+    return Message(kind, head), bool(size)
+
+
 def send(connection: Connection, message: Message) -> None:
-    """Sends a message, in which numbers that are not finite become null.
+    """Sends a message.
 
     Raises:
         OSError: The other end is closed.
     """
-    head = {"kind": message.kind, "blob": len(message.blob), **message.data}
-    connection.send_bytes(json.dumps(finite(head), allow_nan=False).encode())
-    if message.blob:
-        connection.send_bytes(message.blob)
+    for piece in pieces(message):
+        connection.send_bytes(piece)
 
 
 def receive(connection: Connection) -> Message:
@@ -144,12 +162,10 @@ def receive(connection: Connection) -> Message:
         OSError: The connection broke.
         ValueError: That was no message.
     """
-    head = load_json(connection.recv_bytes(LARGEST_MESSAGE))
-    if not isinstance(head, dict) or not isinstance(head.get("kind"), str):
-        raise ValueError("found no kind in a message")
-    kind, size = head.pop("kind"), head.pop("blob", 0)
-    blob = connection.recv_bytes(LARGEST_MESSAGE) if size else b""
-    return Message(kind, head, blob)
+    message, has_blob = head_of(connection.recv_bytes(LARGEST_MESSAGE))
+    if has_blob:
+        return replace(message, blob=connection.recv_bytes(LARGEST_MESSAGE))
+    return message
 
 
 class Steering:

@@ -53,19 +53,12 @@ def studio(
     if find_spec("nicegui") is None:
         raise CdprError(f"cdpr studio needs NiceGUI; {install_words('studio')}")
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
-    from cdpr_drake.studio.server import StudioOptions, serve
+    from cdpr_drake.studio.server import serve
 
     serve(
-        StudioOptions(
-            opened=opened,
-            folder=folder,
-            host=host,
-            port=port,
-            token=token,
-            ready=_open_browser if browser else None,
-            commands=_command_forms,
-        )
-    )
+        opened, folder=folder, host=host, port=port, token=token, commands=_command_forms,
+        **({"ready": _open_browser} if browser else {}),
+    )  # fmt: skip
 
 
 def _command_forms() -> Mapping[str, CommandForm]:

@@ -1,12 +1,10 @@
 """The studio: a local web page for robots, poses, workspaces, runs and studies.
 
-`serve` starts it. Its packages, from the bottom: `workbench` (what a browser session works on, and
-work in child processes), `panels` (a table of the page's panels, with their messages, fields and
-bars). Only this package and `panels` know NiceGUI. Every session has a workbench of its own; all
-sessions share the server's jobs, so that a reload or a second tab loses no run.
+`serve` starts it. `server` starts NiceGUI behind a `Door`, which asks for a cookie that whoever has
+the token gets, and tells sessions by it; `scene_relay` relays Drake's Meshcat to the same address.
+`page` is the page, `panel` the table of its panels with what connects them to a workbench; these
+and `panels` know NiceGUI, nothing else does.
 
-* `server` starts NiceGUI behind a `Guard`, and relays Drake's Meshcat to the same address. The
-  guard asks for a cookie that `Entrance` gives for the token, and tells sessions by it.
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
   knows no page; what shows it connects to its signals.
 * `Document` is the robot as a text with undo and redo, changed only by what the checks accept.
@@ -18,8 +16,10 @@ sessions share the server's jobs, so that a reload or a second tab loses no run.
 * `views` shows what any command left: numbers, verdicts, tables, figures, pages, files. `run`,
   `logs` and `studies` are panels; `RunWatch` shows a run that goes on or is finished alike, with
   `MovingPlots` of its samples or of the rows of its log (`FinishedRun`).
-* `SchemaGroups` makes forms from schemas. `PANELS` is the table of panels; `PanelPages` sends the
-  page with the panel that is shown, and imports the others once the browser is there.
+* `SchemaGroups` makes forms from schemas. `PANELS` is the table of panels.
+* `Job` is any `cdpr` command in a process of its own, `RunJob` a `cdpr simulate` that is followed
+  and steered. All sessions share the server's jobs, so that a reload or a second tab loses no run.
+  A `CommandBoard` starts commands, a `RunBoard` runs; both list what is in a folder of results.
 
 Files are read and written below one folder.
 """

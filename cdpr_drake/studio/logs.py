@@ -22,13 +22,12 @@ from cdpr_drake.analyses.logs.replay import SUMMARY, TABLE
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.panel import LOG, robot_argument, show_errors
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
-from cdpr_drake.studio.panels.panel import robot_argument, show_errors
-from cdpr_drake.studio.panels.result_names import LOG
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
+from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.views import CommandResults, View, place_image, show_results
-from cdpr_drake.studio.workbench.command_board import CommandBoard
-from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 

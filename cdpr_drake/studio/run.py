@@ -14,14 +14,13 @@ from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
-from cdpr_drake.studio.panels.result_names import COMPARED, RUN
+from cdpr_drake.studio.boards import RunBoard, RunEntry
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
+from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch, SceneOfRuns, SteeringBar
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
-from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
@@ -188,7 +187,7 @@ class RunPanel:
                     if self._refused is not None:
                         raise self._refused
                     paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
-                    await run.io_bound(lambda: self._board.start(paused=paused, by_hand=by_hand))
+                    await self._board.start(paused=paused, by_hand=by_hand)
                     self._refresh_runs()
         finally:
             self._start_button.props(remove="loading")

@@ -1,9 +1,9 @@
-"""Relays Drake's Meshcat to the page: same address, same port, same guard as all else.
+"""Relays Drake's Meshcat to the page: same address, same port, same door as all else.
 
 Meshcat knows neither tokens nor sessions, so that nobody but this relay reaches it: the scene is
 behind a socket of the file system, for this user alone. The page's browser, perhaps on another
-machine, asks for `/scene/` and gets the scene of its own session; what it says back is dropped
-there, since Drake ends the process at a message that it cannot read.
+machine, asks for `/scene/` and gets the scene of its own session; what it says back is dropped,
+since Drake ends the process at a message that it cannot read.
 """
 
 from __future__ import annotations
@@ -11,49 +11,28 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 
 import aiohttp
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 
-from cdpr_drake.studio.guard import SESSION
+from cdpr_drake.studio.door import SESSION
 from cdpr_drake.studio.workbench.session import Workbench
 
 SCENE = "/scene/"
 PAGE = "meshcat.html"
 """Meshcat's page."""
 
-STYLE = b"""<style>
-  .dg.main > .close-button { position: static !important; float: right; height: 1.6rem;
-    width: auto !important; margin: 0.5rem; padding: 0 0.7rem; border: 0; border-radius: 0.8rem;
-    font: 0.75rem/1.6rem sans-serif; text-shadow: none; color: #24476b !important;
-    background: #ffffffc0 !important; }
-  .dg.main > .close-button:hover { background: #ffffff !important; }
-</style>
-"""
-"""Of the button that opens Meshcat's controls, else a black bar over the scene."""
-
-SCRIPT = b"""<script>
-  new ResizeObserver(([pane]) => {
-    const {width, height} = pane.contentRect;
-    viewer.camera.zoom = Math.min(1, width / Math.max(height, 1) / 1.25);
-    viewer.camera.updateProjectionMatrix();
-    viewer.set_dirty();
-  }).observe(document.getElementById('meshcat-pane'));
-</script>
-"""
-"""A narrow scene shows as much of the robot across as a wide one."""
+STYLE, SCRIPT = ((Path(__file__).parent / name).read_bytes() for name in ("scene.css", "scene.js"))
 
 LARGEST_MESSAGE = 64_000_000
 """Of a scene [bytes]; meshes come in one message."""
 
 TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
 
-BenchOf = Callable[[str], Workbench | None]
-"""The workbench of a session by its id."""
 
-
-def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
-    """Adds the routes below `SCENE` to the server."""
+def add_scene_relay(app: FastAPI, bench_of: Callable[[str], Workbench | None]) -> None:
+    """Adds the routes below `SCENE` to the server; `bench_of` says the workbench of a session."""
 
     @app.get(SCENE + "{name:path}", include_in_schema=False)
     async def asset(request: Request, name: str) -> Response:
@@ -61,17 +40,13 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
         if bench is None:
             return Response("There is no session; reload the page.", status_code=404)
         page = name or PAGE
-        async with (
-            await _scene(bench) as session,
-            session.get(f"http://scene/{page}") as answer,
-        ):
-            body, found = await answer.read(), answer.status
+        async with await _scene(bench) as scene, scene.get(f"http://scene/{page}") as answer:
+            body = await answer.read()
         if page == PAGE:
-            body = body.replace(b"</head>", STYLE + b"</head>", 1)
-            body = body.replace(b"</body>", SCRIPT + b"</body>", 1)
-        ending = "." + page.rpartition(".")[2]
+            body = body.replace(b"</head>", b"<style>" + STYLE + b"</style></head>", 1)
+            body = body.replace(b"</body>", b"<script>" + SCRIPT + b"</script></body>", 1)
         return Response(
-            body, status_code=found, media_type=TYPES.get(ending, "application/octet-stream")
+            body, answer.status, media_type=TYPES.get(Path(page).suffix, "application/octet-stream")
         )
 
     @app.websocket(SCENE)
@@ -83,8 +58,8 @@ def add_scene_relay(app: FastAPI, bench_of: BenchOf) -> None:
         await socket.accept()
         with suppress(aiohttp.ClientError, WebSocketDisconnect, RuntimeError):
             async with (
-                await _scene(bench) as session,
-                session.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
+                await _scene(bench) as scene,
+                scene.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
             ):
                 await _relay(socket, meshcat)
         with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
@@ -98,24 +73,16 @@ async def _scene(bench: Workbench) -> aiohttp.ClientSession:
 
 
 async def _relay(socket: WebSocket, meshcat: aiohttp.ClientWebSocketResponse) -> None:
-    """Hands messages on in both directions, until one side ends."""
+    """Hands on what the scene says, until one side ends; drops what the browser says."""
 
     async def down() -> None:
         async for message in meshcat:
             if message.type == aiohttp.WSMsgType.BINARY:
                 await socket.send_bytes(message.data)
-            elif message.type == aiohttp.WSMsgType.TEXT:
-                await socket.send_text(message.data)
 
     async def up() -> None:
-        while True:
-            message = await socket.receive()
-            if message["type"] == "websocket.disconnect":
-                return
-            if message.get("bytes") is not None:
-                await meshcat.send_bytes(message["bytes"])
-            elif message.get("text") is not None:
-                await meshcat.send_str(message["text"])
+        while (await socket.receive())["type"] != "websocket.disconnect":
+            pass
 
     both = [asyncio.create_task(down()), asyncio.create_task(up())]
     try:

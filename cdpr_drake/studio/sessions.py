@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+import asyncio
 from collections.abc import Callable
 
 from cdpr_drake.studio.workbench.session import Workbench
@@ -17,7 +17,7 @@ class Sessions:
     def __init__(self, make: Callable[[], Workbench]) -> None:
         """With what makes a new workbench."""
         self._make = make
-        self._benches: OrderedDict[str, Workbench] = OrderedDict()
+        self._benches: dict[str, Workbench] = {}
         self._refused: dict[str, Exception] = {}
         self._pages: dict[str, int] = {}
 
@@ -25,12 +25,12 @@ class Sessions:
         """The workbench of a session, if there is one."""
         return self._benches.get(session)
 
-    def prepare(self, session: str) -> None:
-        """Makes the workbench of a session that has none; for a thread that may read files."""
+    async def prepare(self, session: str) -> None:
+        """Makes the workbench of a session that has none, in another thread: it reads files."""
         if session not in self._benches:
             try:
-                self._benches.setdefault(session, self._make())
-                self._refused.pop(session, None)
+                bench = await asyncio.to_thread(self._make)
+                self._benches.setdefault(session, bench)
             except Exception as problem:
                 self._refused[session] = problem
 
@@ -41,19 +41,16 @@ class Sessions:
             CdprError: It cannot be made.
         """
         refused = self._refused.pop(session, None)
-        if refused is not None:
+        if refused is not None and session not in self._benches:
             raise refused
-        if session not in self._benches:
-            self._benches[session] = self._make()
-        self._benches.move_to_end(session)
+        bench = self._benches.pop(session, None) or self._make()
+        self._benches[session] = bench  # the last one now
         self._pages[session] = self._pages.get(session, 0) + 1
         for other in list(self._benches):
-            if len(self._benches) <= MOST_SESSIONS:
-                break
-            if not self._pages.get(other) and other != session:
+            if len(self._benches) > MOST_SESSIONS and not self._pages.get(other):
                 del self._benches[other]
                 self._pages.pop(other, None)
-        return self._benches[session]
+        return bench
 
     def close_page(self, session: str) -> None:
         """Says that a page of a session is closed for good; its workbench is kept."""

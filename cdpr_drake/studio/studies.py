@@ -11,12 +11,11 @@ from nicegui import run, ui
 
 from cdpr_drake.analyses.studies.study import STUDIES
 from cdpr_drake.errors import CdprError
+from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.panel import STUDY, show_errors
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
-from cdpr_drake.studio.panels.panel import show_errors
-from cdpr_drake.studio.panels.result_names import STUDY
+from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.views import CommandResults, View, changed, place_figure, read_results
-from cdpr_drake.studio.workbench.command_board import CommandBoard
-from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5

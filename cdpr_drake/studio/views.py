@@ -23,14 +23,13 @@ from nicegui import run, ui
 from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.boards import CommandBoard, CommandEntry
+from cdpr_drake.studio.job_bar import JobBar
+from cdpr_drake.studio.jobs import Job, JobState
+from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.panels.command_fields import CommandFields
-from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.numbers import fact_rows, number_words, plain_table
-from cdpr_drake.studio.panels.panel import notify, show_errors
-from cdpr_drake.studio.workbench.command_board import CommandBoard, CommandEntry
 from cdpr_drake.studio.workbench.command_form import FieldProblem
-from cdpr_drake.studio.workbench.command_job import CommandJob
-from cdpr_drake.studio.workbench.job import JobState
 
 RESULTS = ("results.json", "summary.json")
 """Files that have a command's numbers; the first that is there."""
@@ -355,7 +354,7 @@ class CommandResults:
             show: Places the results of a folder into the current slot.
         """
         self._board, self._fields, self._show = board, fields, show
-        self._job: CommandJob | None = None
+        self._job: Job | None = None
         self._shown: tuple[Path | None, float] = None, 0.0
         self.bar = JobBar(board, label)
         self._body = ui.element("div").classes("w-full").mark(f"{board.name}-shown")

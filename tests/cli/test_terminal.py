@@ -19,7 +19,7 @@ from cdpr_drake.cli import compiling as compiling_module
 from cdpr_drake.cli import process, terminal
 from cdpr_drake.cli.compiling import _compilations, compiling
 from cdpr_drake.cli.process import PROGRESS
-from cdpr_drake.studio.workbench import job_process as child
+from cdpr_drake.studio import jobs
 from tests.messages import messages, printed
 
 
@@ -92,8 +92,8 @@ def test_lines_of_progress_are_whole_and_told_from_messages(capsys, monkeypatch)
 
 def test_who_reads_progress_knows_its_mark():
     """The studio's server imports nothing of the commands that it starts."""
-    assert child.PROGRESS == PROGRESS
-    assert child.PROGRESS_PERIOD == terminal.PROGRESS_PERIOD
+    assert jobs.PROGRESS == PROGRESS
+    assert jobs.PROGRESS_PERIOD == terminal.PROGRESS_PERIOD
 
 
 def test_no_test_reads_stderr_but_through_messages():

@@ -19,8 +19,8 @@ from selenium.webdriver.common.keys import Keys
 from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.workbench.command_board import ABOUT
-from cdpr_drake.studio.workbench.result_subject import subject_of
+from cdpr_drake.studio.boards import ABOUT
+from cdpr_drake.studio.results import subject_of
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.chromium import LONGEST_WAIT, chromium, wait_for
 from tests.studio.run_page import press

@@ -1,7 +1,6 @@
 """Forms of commands, and what commands left: without a page."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
@@ -12,11 +11,7 @@ from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
-from cdpr_drake.studio.workbench.command_job import CommandJob
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.workspace_regions import (
     PLANE,
@@ -150,93 +145,6 @@ def test_broken_results_are_one_message(tmp_path, words):
     (tmp_path / "results.json").write_text(words, encoding="latin-1")
     with pytest.raises(CdprError):
         read_regions(tmp_path)
-
-
-STEADY = """
-import pathlib, signal, sys, time
-folder = pathlib.Path(next(a for a in sys.argv if a.startswith("--out="))[6:])
-folder.mkdir(parents=True, exist_ok=True)
-def stop(*_):
-    (folder / "kept").write_text("half")
-    sys.exit(130)
-signal.signal(signal.SIGTERM, stop)
-print("progress: some: 50 %, half of it", file=sys.stderr, flush=True)
-if (folder / "kept").exists():
-    (folder / "results.json").write_text("{}")
-    sys.exit(0)
-time.sleep(3600)
-"""
-
-
-def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
-    tmp_path, monkeypatch, forms
-):
-    monkeypatch.setattr(CommandJob, "program", (sys.executable, "-c", STEADY))
-    jobs = JobManager()
-    board = CommandBoard(jobs, tmp_path, "workspaces", forms)
-    first = board.start("some", ["workspace", "acrobot_small"])
-    try:
-        while first.progress[0] is None and not first.state.is_over:  # it listens to SIGTERM then
-            first.wait(0.05)
-        assert first.progress == (0.5, "some: half of it")
-        assert board.go_on(board.choices()["some"]) is None  # it works
-        first.stop()
-        assert first.wait(1200.0)
-        assert first.state == JobState.STOPPED
-        assert not board.choices()["some"].is_whole
-        board = CommandBoard(jobs, tmp_path, "workspaces", forms)
-        assert board.choices()["some"].job is first
-        jobs.close()
-        jobs = JobManager()  # as when the server was started anew
-        board = CommandBoard(jobs, tmp_path, "workspaces", forms)
-        there = board.choices()["some"]
-        assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
-        second = board.go_on(there)
-        assert second.wait(1200.0)
-        assert second.state == JobState.FINISHED
-        assert (second.arguments, second.folder) == (first.arguments, first.folder)
-        assert board.choices()["some"].is_whole
-        assert board.choices()["some"].asked == ()  # it is done
-        assert [path.name for path in board.folder.iterdir()] == ["some"]
-    finally:
-        jobs.close()
-
-
-@pytest.mark.parametrize(
-    ("words", "runs"),
-    [
-        ('["workspace", "acrobot_small", "--kind=static", "--certify"]', True),
-        ('["study", "case-9", "--quick"]', True),
-        ('["workspace", "mine.yaml"]', True),
-        ('["workspace", "/etc/hostname"]', False),
-        ('["workspace", "acrobot_small", "--obstacles=../secret.yaml"]', False),
-        ('["workspace", "acrobot_small", "--certify=yes"]', False),
-        ('["study", "case-9", "--runs-from=/etc"]', False),
-        ('["study", "case-9", "--out=/tmp"]', False),
-        ('["simulate", "acrobot_pbvs"]', False),
-        ('["study"]', False), ("{}", False), ("[1]", False), ("[", False),
-    ],
-)  # fmt: skip
-def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, forms, words, runs):
-    (tmp_path / "studies" / "some").mkdir(parents=True)
-    (tmp_path / "studies" / ".some.asked.json").write_text(words)
-    jobs = JobManager()
-    board = CommandBoard(jobs, tmp_path, "studies", forms)
-    there = board.choices()["some"]
-    assert bool(there.asked) == runs
-    if not runs:
-        assert board.go_on(there) is None
-        assert jobs.jobs == []
-
-
-def test_a_board_lists_finished_folders_the_newest_first_and_no_links(tmp_path):
-    board = CommandBoard(JobManager(), tmp_path, "studies", {})
-    assert board.choices() == {}
-    for name in ("b", "a"):
-        (tmp_path / "studies" / name).mkdir(parents=True)
-    (tmp_path / "studies" / "a" / "results.json").write_text("{}")
-    (tmp_path / "studies" / "link").symlink_to(tmp_path / "studies" / "a")
-    assert list(board.choices()) == ["a"]
 
 
 def test_workspaces_of_stability_are_layers_and_their_margin_a_plane(tmp_path):

@@ -9,7 +9,6 @@ import pytest
 from cdpr_drake.formats.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.page import PREFERS_DARK
-from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
 from tests.studio.fuzz import fuzz
@@ -200,13 +199,3 @@ async def test_a_robot_is_opened_saved_and_opened_again(user, bench, work):
     user.find(marker="save-as").click()
     type_into(user, "save-name", "mine.yaml")
     await user.should_see("mine.yaml: is there already; replace it, or rename", retries=3000)
-
-
-def test_sessions_that_nobody_looks_at_make_room():
-    sessions = Sessions(object)
-    first = sessions.open_page("0")
-    for number in range(1, MOST_SESSIONS + 5):
-        sessions.open_page(str(number))
-        sessions.close_page(str(number))
-    assert sessions.open_page("0") is first
-    assert len(sessions.benches()) == MOST_SESSIONS

@@ -7,10 +7,9 @@ import sys
 import zipfile
 from contextlib import asynccontextmanager
 
+from cdpr_drake.studio.jobs import JobManager, JobState
 from cdpr_drake.studio.run import run_panel
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.job_manager import JobManager
-from cdpr_drake.studio.workbench.run_job import RunJob
+from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, shown, simulated, until
@@ -27,7 +26,7 @@ async def opened_panel(folder):
             await until(lambda: shown(user, "field-duration"))
             yield user, bench
     finally:
-        jobs.close()
+        await jobs.close()
 
 
 def says(user, name, words):
@@ -63,20 +62,20 @@ async def test_a_finished_run_is_looked_at_compared_and_downloaded(alone, tmp_pa
     for name in ("first", "second"):
         shutil.copytree(alone, tmp_path / "runs" / name)
     async with opened_panel(tmp_path) as (user, _):
-        await until(lambda: "folder first" in field(user, "run").options)
-        field(user, "run").value = "folder first"
+        await until(lambda: "first" in field(user, "run").options)
+        field(user, "run").value = "first"
         await until(lambda: says(user, "outcome", "timeout"))
         field(user, "cursor").value = 0.1
         assert field(user, "camera").props["src"].startswith("data:image/jpeg;base64,")
         compare = field(user, "compare")
-        assert list(compare.options) == ["none", "folder second"]
-        compare.value = "folder second"
-        field(user, "run").value = "folder second"  # which is not compared with itself
-        await until(lambda: list(field(user, "compare").options) == ["none", "folder first"])
+        assert list(compare.options) == ["none", "second"]
+        compare.value = "second"
+        field(user, "run").value = "second"  # which is not compared with itself
+        await until(lambda: list(field(user, "compare").options) == ["none", "first"])
         assert field(user, "compare").value == "none"
-        field(user, "compare").value = "folder first"
-        field(user, "run").value = "folder first"
-        await until(lambda: list(field(user, "compare").options) == ["none", "folder second"])
+        field(user, "compare").value = "first"
+        field(user, "run").value = "first"
+        await until(lambda: list(field(user, "compare").options) == ["none", "second"])
         user.find(marker="download").click()
         data = await user.download.next(timeout=1200.0)
         with zipfile.ZipFile(io.BytesIO(data.content)) as archive:

@@ -6,8 +6,7 @@ from urllib.request import HTTPCookieProcessor, build_opener
 
 from nicegui import ElementFilter
 
-from cdpr_drake.studio.panels.panel import Panel
-from cdpr_drake.studio.panels.table import PANELS
+from cdpr_drake.studio.panel import PANELS, Panel
 from tests.studio.pages import opened_page
 
 LATER = (
@@ -24,7 +23,7 @@ ONE_OF_EACH = ("undo", "coordinate-2", "start-workspace", "start", "log", "studi
 IMPORTED = """
 import sys
 import cdpr_drake.studio.server
-from cdpr_drake.studio.panels.table import PANELS
+from cdpr_drake.studio.panel import PANELS
 PANELS["robot"].load()
 print(*sorted(sys.modules))
 """
@@ -50,7 +49,7 @@ def test_the_page_has_the_panel_that_is_shown_and_no_other(studio):
 
 
 async def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(tmp_path, monkeypatch):
-    broken = Panel("pose", "Pose", "open_with", {}, "cdpr_drake.studio.panels.no_such", "none")
+    broken = Panel("Pose", "open_with", "panels.no_such:none", {})
     monkeypatch.setitem(PANELS, "pose", broken)
     async with opened_page(tmp_path) as (user, _, _):
         with user:

@@ -6,10 +6,10 @@ import shutil
 import pytest
 
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.panels.table import PANELS
+from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.panels.workspace import _views
+from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run import _boards, _scenes
-from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from tests.studio.pages import field, open_panel, problems, shown, until
 
@@ -25,14 +25,14 @@ async def workspaces(user, bench):
 
 
 async def run(user, bench):
-    await until(lambda: "folder first" in field(user, "run").options)
-    field(user, "run").value = "folder first"
+    await until(lambda: "first" in field(user, "run").options)
+    field(user, "run").value = "first"
     await until(lambda: bench.results.subject("run") is not None)
 
 
 async def compared(user, bench):
-    await until(lambda: "folder second" in field(user, "compare").options)
-    field(user, "compare").value = "folder second"
+    await until(lambda: "second" in field(user, "compare").options)
+    field(user, "compare").value = "second"
     await until(lambda: bench.results.subject("compared") is not None)
 
 

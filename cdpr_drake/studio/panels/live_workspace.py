@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import on_page, show_errors
+from cdpr_drake.studio.panel import on_page, show_errors
 from cdpr_drake.studio.workbench.live_workspace import LiveWorkspace
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
 from cdpr_drake.studio.workbench.session import Workbench

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from nicegui import events, ui
 
-from cdpr_drake.studio.panels.panel import notify, show_errors
+from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.workbench.session import Workbench
 
 MOVED = "studio_point"

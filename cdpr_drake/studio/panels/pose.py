@@ -9,8 +9,8 @@ import numpy as np
 from nicegui import ui
 
 from cdpr_drake.geometry.poses import angles_from_rotation
+from cdpr_drake.studio.panel import message, on_page, show_errors
 from cdpr_drake.studio.panels.numbers import cable_table, fact_table, number_words
-from cdpr_drake.studio.panels.panel import message, on_page, show_errors
 from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
 from cdpr_drake.studio.workbench.pose_axes import PoseAxis
 from cdpr_drake.studio.workbench.session import Workbench

@@ -7,8 +7,8 @@ from html import escape
 from nicegui import ui
 
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.panel import on_page, show_errors
 from cdpr_drake.studio.panels.live_workspace import live_workspace_bar
-from cdpr_drake.studio.panels.panel import on_page, show_errors
 from cdpr_drake.studio.panels.point_dragging import add_point_dragging
 from cdpr_drake.studio.panels.robot_beside import RobotBeside
 from cdpr_drake.studio.panels.robot_dialogs import (

@@ -12,7 +12,7 @@ from nicegui import events, run, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.panels.panel import message, notify, show_errors
+from cdpr_drake.studio.panel import message, notify, show_errors
 from cdpr_drake.studio.workbench.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,

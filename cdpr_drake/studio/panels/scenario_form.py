@@ -7,7 +7,7 @@ from typing import Any
 from nicegui import run, ui
 
 from cdpr_drake.errors import CdprError, DataFileError
-from cdpr_drake.studio.panels.panel import message
+from cdpr_drake.studio.panel import message
 from cdpr_drake.studio.workbench.scenario_draft import (
     COMMON,
     ROBOT,

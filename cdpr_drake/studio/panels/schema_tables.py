@@ -9,8 +9,8 @@ from nicegui import ui
 
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.declarations import Setting, settings_of
+from cdpr_drake.studio.panel import notify
 from cdpr_drake.studio.panels.field_words import axis_names, in_parts, typed_value
-from cdpr_drake.studio.panels.panel import notify
 from cdpr_drake.studio.panels.schema_form import Place, SchemaForm, value_at
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.yaml_edit import with_item, with_value, without_item

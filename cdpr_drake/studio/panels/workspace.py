@@ -13,15 +13,21 @@ from cdpr_drake.analyses.workspaces.conditions import KINDS, MEASURES
 from cdpr_drake.palette import TENSIONS
 from cdpr_drake.stability.stability_case import SCHEMES
 from cdpr_drake.stability.verdict import VERDICTS
+from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.job_bar import JobBar
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import (
+    WORKSPACES,
+    message,
+    notify,
+    on_page,
+    robot_argument,
+    show_errors,
+)
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
-from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.panel import message, notify, on_page, robot_argument, show_errors
-from cdpr_drake.studio.panels.result_names import WORKSPACES
+from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.workbench.calculator import Signal
-from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
-from cdpr_drake.studio.workbench.job import JobState
-from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.workspace_regions import (
     Layer,

@@ -21,14 +21,14 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.results import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.calculator import Calculator, Signal
 from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.document import Document
-from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.live_workspace import LiveWorkspace
 from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer
 from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
-from cdpr_drake.studio.workbench.result_subject import Results, Subject, subject_of
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder

@@ -1,4 +1,4 @@
-"""What a panel is, how it connects to a workbench, and messages in the page.
+"""The table of panels, how one connects to a workbench, and messages in the page.
 
 Errors are messages, too: whatever a handler raises, the server stays alive, see `show_errors`.
 """
@@ -17,8 +17,16 @@ from nicegui import background_tasks, ui
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.workbench.calculator import Signal
-from cdpr_drake.studio.workbench.result_subject import Subject
 from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
+
+WORKSPACES, RUN, COMPARED, LOG, STUDY = "workspaces", "run", "compared", "log", "study"
+"""Names of results: computed workspaces, the run that is shown, the one behind it, a log beside the
+model, a study."""
+
+LONGEST = 490
+"""Characters of a message; longer ones lose their middle."""
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -26,30 +34,40 @@ class Panel:
     """A panel of the page.
 
     Attributes:
-        name: In addresses and tests.
         title: On its tab.
         icon: Name of a Material icon.
+        place: Its function that places the elements into the current slot, for a workbench, as
+            `module:function`; the module is imported behind the page.
         results: The results that it shows by name, with words for a person. It tells
             `Workbench.results` what each is about, and the page says above the panel which are
             about something else than what is open.
-        module: The module that has it, imported when the panel is opened, or behind the page.
-        function: Its function that places the elements into the current slot, for a workbench.
     """
 
-    name: str
     title: str
     icon: str
+    place: str
     results: Mapping[str, str]
-    module: str
-    function: str
 
-    def load(self) -> None:
-        """Imports what the panel needs."""
-        import_module(self.module)
+    def load(self) -> Callable[[Workbench], None]:
+        """Imports what the panel needs; returns its function."""
+        module, _, function = self.place.partition(":")
+        return getattr(import_module(f"cdpr_drake.studio.{module}"), function)
 
-    def build(self, bench: Workbench) -> None:
-        """Places its elements into the current slot."""
-        getattr(import_module(self.module), self.function)(bench)
+
+PANELS = {
+    "robot": Panel("Robot", "precision_manufacturing", "panels.robot:robot_panel", {}),
+    "pose": Panel("Pose", "open_with", "panels.pose:pose_panel", {POSE_NUMBERS: "Numbers"}),
+    "workspace": Panel(
+        "Workspace", "view_in_ar", "panels.workspace:workspace_panel", {WORKSPACES: "Workspaces"}
+    ),
+    "run": Panel(
+        "Run", "play_circle", "run:run_panel",
+        {RUN: "The run that is shown", COMPARED: "The run behind it"},
+    ),
+    "logs": Panel("Logs", "timeline", "logs:logs_panel", {LOG: "The comparison"}),
+    "studies": Panel("Studies", "science", "studies:studies_panel", {STUDY: "Studies"}),
+}  # fmt: skip
+"""Panels by name, in the order of their tabs."""
 
 
 def place_remarks(bench: Workbench, panel: Panel) -> None:
@@ -58,34 +76,28 @@ def place_remarks(bench: Workbench, panel: Panel) -> None:
     for name in panel.results:
         labels[name] = ui.label().classes("studio-stale").props('role="status"')
         labels[name].mark(f"about-{name}")
-        if name != POSE_NUMBERS:  # which are always of the robot that is open
+        if (
+            name == POSE_NUMBERS
+        ):  # always of the robot that is open, and new at each step of a slider
+            labels[name].classes("studio-kept")
+        else:
             prints[name] = ui.label().classes("studio-fingerprint").mark(f"fingerprint-{name}")
-    if POSE_NUMBERS in labels:  # they change at each step of a slider: nothing may jump
-        labels[POSE_NUMBERS].classes("studio-kept")
 
     def refresh() -> None:
         for name, label in labels.items():
             words = bench.results.differs(name)
-            said = f"{panel.results[name]}: {words}." if words else ""
-            if label.text != said:
-                label.text = said
+            label.text = f"{panel.results[name]}: {words}." if words else ""
         for name, label in prints.items():
             subject = bench.results.subject(name)
+            label.text = ""
+            if subject is not None and subject.digest:
+                label.text = f"{panel.results[name]}: {subject.robot}, {subject.fingerprint}"
             if subject is not None:  # robots of its own are nothing to be warned of
-                labels[name].classes(
-                    add="" if subject.robot else "studio-soft",
-                    remove="studio-soft" if subject.robot else "",
-                )
-            said = "" if subject is None else _fingerprint(panel.results[name], subject)
-            if label.text != said:
-                label.text = said
+                soft = "" if subject.robot else "studio-soft"
+                labels[name].classes(add=soft, remove="" if soft else "studio-soft")
 
     refresh()
     on_page(bench.results.changed, refresh)
-
-
-def _fingerprint(words: str, subject: Subject) -> str:
-    return f"{words}: {subject.robot}, {subject.fingerprint}" if subject.digest else ""
 
 
 def on_page(signal: Signal, listener: Callable[[], Awaitable[None] | None]) -> None:
@@ -99,13 +111,10 @@ def on_page(signal: Signal, listener: Callable[[], Awaitable[None] | None]) -> N
         with client:
             await listener()  # type: ignore[misc]
 
-    def call() -> None:
-        if iscoroutinefunction(listener):
-            background_tasks.create(later(), name="listener")
-        else:
-            listener()
+    def soon() -> None:
+        background_tasks.create(later(), name="listener")
 
-    client.on_delete(signal.connect(call))
+    client.on_delete(signal.connect(soon if iscoroutinefunction(listener) else listener))  # type: ignore[arg-type]
 
 
 def robot_argument(bench: Workbench) -> str:
@@ -118,12 +127,6 @@ def robot_argument(bench: Workbench) -> str:
     if not name:
         raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
     return name if name in robot_names() else str(bench.folder.path(name))
-
-
-LONGEST = 490
-"""Characters of a message; longer ones lose their middle."""
-
-_LOG = logging.getLogger(__name__)
 
 
 def message(problem: BaseException) -> str:

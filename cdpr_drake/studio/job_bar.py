@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from cdpr_drake.studio.panels.panel import show_errors
-from cdpr_drake.studio.workbench.command_board import CommandBoard, CommandEntry
-from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.boards import CommandBoard, CommandEntry
+from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.panel import show_errors
 
 
 class JobBar:

@@ -1,0 +1,364 @@
+"""What a session looks at of one folder of results: jobs of the server, and what others left."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.finished_run import FinishedRun, is_run
+from cdpr_drake.studio.jobs import Job, JobManager, JobState
+from cdpr_drake.studio.run_job import RunJob
+from cdpr_drake.studio.workbench.command_form import CommandForm
+from cdpr_drake.studio.workbench.scenario_draft import ScenarioDraft
+from cdpr_drake.systems.diagrams.load import load_scenario
+
+RUNS = "runs"
+"""Folder of results in the working folder, as that of `cdpr simulate`."""
+
+MOST_FOLDERS = 200
+"""Results folders that are offered, the newest ones."""
+
+LOOK_PERIOD = 0.4
+"""Between two looks at the folders [s]."""
+
+ASKED = ".asked.json"
+"""Ending of the file beside a results folder that says how it was asked for, so that it can go on
+when the server was started anew; gone when the work is done."""
+
+ABOUT = ".about.json"
+"""Ending of the file beside a results folder that says which robot it is about, as it was then."""
+
+LARGEST_FILE = 100_000
+"""Of such a file that is read [bytes]."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What is in a results folder and in the files beside it.
+
+    Attributes:
+        asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
+            or it is done.
+        about: Name and digest of the robot that it is about; empty: not known.
+        is_whole: Whether all results are there.
+    """
+
+    asked: tuple[str, ...] = ()
+    about: Mapping[str, str] = field(default_factory=dict)
+    is_whole: bool = False
+
+
+J = TypeVar("J", bound=Job)
+
+
+@dataclass(frozen=True)
+class Entry(Left, Generic[J]):
+    """Results that are there, or come.
+
+    Attributes:
+        name: What people see.
+        job: The newest job that works in the folder, as long as the server has it.
+        folder: The results folder.
+    """
+
+    name: str = ""
+    job: J | None = None
+    folder: Path = Path()
+
+    def scenario(self) -> Any | None:
+        """The scenario of a run; None: it is not known any more.
+
+        Raises:
+            CdprError: It is not accepted any more.
+        """
+        file = self.folder / "scenario.yaml"
+        if file.is_file():
+            return load_scenario(file)
+        if isinstance(self.job, RunJob):
+            return load_scenario(self.job.scenario, self.job.settings)
+        return None
+
+
+CommandEntry = Entry[Job]
+RunEntry = Entry[RunJob]
+
+
+class Board(Generic[J]):
+    """Results below one folder, each with the job that works there.
+
+    Attributes:
+        name: Of the folder that all results are below.
+        shown: Key of what is looked at, of `choices`, the name of its folder; empty: nothing.
+    """
+
+    def __init__(
+        self, jobs: JobManager, root: Path, name: str, kind: type[J],
+        is_whole: Callable[[Path], bool],
+    ) -> None:  # fmt: skip
+        """With the server's jobs and the working folder.
+
+        Args:
+            jobs: The jobs.
+            root: The working folder.
+            name: As the attribute.
+            kind: Class of the jobs that work there.
+            is_whole: Whether all results are in a folder.
+        """
+        self._jobs, self._root, self.name = jobs, root, name
+        self._kind, self._is_whole = kind, is_whole
+        self.shown = ""
+        self._left: dict[Path, Left] = {}
+        self._looks, self._looked = False, -LOOK_PERIOD
+
+    @property
+    def folder(self) -> Path:
+        """What all results are below."""
+        return self._root / self.name
+
+    def choices(self) -> dict[str, Entry[J]]:
+        """What there is, the newest first: jobs of the server, then folders.
+
+        In an event loop folders are read by another thread, and are those of the last look.
+        """
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            self._look()
+        else:
+            if not self._looks and time.monotonic() - self._looked > LOOK_PERIOD:
+                self._looks = True
+                loop.run_in_executor(None, self._look)
+        found: dict[str, Entry[J]] = {}
+        for job in reversed(self._jobs.jobs):
+            folder = job.folder
+            if isinstance(job, self._kind) and folder and folder.parent == self.folder:
+                left = self._left.get(folder, Left())
+                unfinished = job.state in (JobState.FAILED, JobState.STOPPED)
+                asked = left.asked if unfinished else ()
+                name = f"{folder.name}, {job.state.value}"
+                found.setdefault(
+                    folder.name, Entry(asked, left.about, left.is_whole, name, job, folder)
+                )
+        for folder, left in self._left.items():
+            name = f"{folder.name}, stopped" if left.asked else folder.name
+            found.setdefault(folder.name, Entry(**vars(left), name=name, folder=folder))
+        return found
+
+    def _look(self) -> None:
+        """Reads what there is in the folders."""
+        try:
+            self._left = {folder: self._read(folder) for folder in self._results()}
+        except OSError:
+            self._left = {}
+        finally:
+            self._looks, self._looked = False, time.monotonic()
+
+    def _read(self, folder: Path) -> Left:
+        return Left(self._how(folder), self._about(folder), self._is_whole(folder))
+
+    def _results(self) -> list[Path]:
+        """Folders with results, whole or not, the newest first; none that a link leads to."""
+        if not self.folder.is_dir() or self.folder.is_symlink():
+            return []
+        some = [
+            path for path in self.folder.iterdir()
+            if not path.is_symlink() and not path.name.startswith(".") and path.is_dir()
+            and (self._is_whole(path) or self._beside(path, ASKED).is_file())
+        ]  # fmt: skip
+        return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
+
+    def _beside(self, folder: Path, ending: str) -> Path:
+        return self.folder / f".{folder.name}{ending}"
+
+    def _about(self, folder: Path) -> dict[str, str]:
+        told = _told(self._beside(folder, ABOUT))
+        fits = isinstance(told, dict) and all(isinstance(value, str) for value in told.values())
+        return told if fits else {}
+
+    def _how(self, folder: Path) -> tuple[str, ...]:
+        """How a folder was asked for; empty where that is not known, or nothing to be run."""
+        told = _told(self._beside(folder, ASKED))
+        fits = isinstance(told, list) and all(isinstance(word, str) for word in told)
+        return tuple(told) if fits and self._may_run(told) else ()
+
+    def _may_run(self, words: Sequence[str]) -> bool:
+        """Whether arguments from a file are such as a page would make."""
+        return False
+
+
+class CommandBoard(Board[Job]):
+    """Commands of one kind, which go on in the folder where they were stopped."""
+
+    def __init__(
+        self,
+        jobs: JobManager,
+        root: Path,
+        name: str,
+        forms: Mapping[str, CommandForm],
+        *,
+        is_whole: Callable[[Path], bool] = lambda folder: (folder / "results.json").is_file(),
+    ) -> None:
+        """As the base class; what a file asks for beyond the `forms` of commands is not run."""
+        super().__init__(jobs, root, name, Job, is_whole)
+        self._forms = forms
+
+    def start(
+        self, name: str, arguments: Sequence[str], about: Mapping[str, str] | None = None
+    ) -> Job:
+        """Begins a command with results in a new folder, and looks at it.
+
+        Args:
+            name: Of the folder.
+            arguments: Of the command, without --out and --json.
+            about: Name and digest of the robot that it is about; None: no robot.
+        """
+        folder = self._jobs.free_folder(self.folder / name)
+        with suppress(OSError):  # a full disk, say: the command will tell
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._beside(folder, ASKED).write_text(json.dumps(list(arguments)), encoding="utf-8")
+            if about is not None:
+                self._beside(folder, ABOUT).write_text(json.dumps(dict(about)), encoding="utf-8")
+        return self._submit(folder, arguments)
+
+    def go_on(self, computed: CommandEntry) -> Job | None:
+        """Begins a command anew where it was stopped; None: it works, or nobody knows how it was
+        asked for."""
+        if not computed.asked or (computed.job is not None and not computed.job.state.is_over):
+            return None
+        return self._submit(computed.folder, computed.asked)
+
+    def _submit(self, folder: Path, arguments: Sequence[str]) -> Job:
+        job = Job(
+            folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder,
+            done_with=self._beside(folder, ASKED),
+        )  # fmt: skip
+        self._jobs.submit(job)
+        self.shown = folder.name
+        return job
+
+    def _may_run(self, words: Sequence[str]) -> bool:
+        form = self._forms.get(words[0]) if words else None
+        if form is None or len(words) < 2 or words[1].startswith("-"):
+            return False
+        known = words[0] == "study" or words[1] in robot_names() or self._is_inside(words[1])
+        return known and form.allows(words[2:], self._is_inside)
+
+    def _is_inside(self, name: str) -> bool:
+        """Whether a path leads to something in the working folder, also by links."""
+        try:
+            return (self._root / name).resolve().is_relative_to(self._root.resolve())
+        except (OSError, RuntimeError, ValueError):
+            return False
+
+
+class RunBoard(Board[RunJob]):
+    """What the run panel of a session shows; all its tabs show the same.
+
+    Attributes:
+        draft: The scenario that is worked on; None: none was chosen.
+        compared: Key of the run behind the one that is shown; empty: none.
+        speed: Speed of the next run; None: as fast as possible.
+        cursor: Time that is looked at in a finished run [s]; None: none.
+    """
+
+    def __init__(self, jobs: JobManager, root: Path) -> None:
+        """With the jobs of the server and the working folder."""
+        super().__init__(jobs, root, RUNS, RunJob, is_run)
+        self.draft: ScenarioDraft | None = None
+        self.compared = ""
+        self.speed: float | None = 1.0
+        self.cursor: float | None = None
+        self._finished: dict[Path, FinishedRun] = {}
+
+    def choose(self, scenario: str) -> ScenarioDraft:
+        """Works on a scenario from now on; changes of the same one are kept.
+
+        Raises:
+            CdprError: It is not accepted.
+        """
+        if self.draft is None or self.draft.name != scenario:
+            self.draft = ScenarioDraft(scenario, self._root)
+        return self.draft
+
+    async def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
+        """Begins a run of the draft, and looks at it.
+
+        Args:
+            paused: Whether it stands at the start.
+            by_hand: Whether cables can be broken and the platform pushed while it runs.
+
+        Raises:
+            CdprError: The draft is not accepted.
+        """
+        draft = self.draft
+        assert draft is not None
+        scenario = await asyncio.to_thread(draft.check)
+        hands = await asyncio.to_thread(draft.by_hand) if by_hand else ()
+        job = RunJob(
+            draft.name, self._root, self._jobs.free_folder(self.folder / scenario.name),
+            settings=(*draft.settings(), *hands), speed=self.speed, paused=paused,
+        )  # fmt: skip
+        self._jobs.submit(job)
+        assert job.folder is not None
+        self.shown, self.cursor = job.folder.name, None
+        return job
+
+    def recover(self, job: RunJob) -> Job:
+        """Writes results of a run that was killed, as far as it was simulated."""
+        assert job.folder is not None
+        title = f"{job.title}: results of what there is"
+        arguments = ["finish", str(job.folder), "--json"]
+        return self._jobs.submit(Job(title, arguments, self._root, job.folder))
+
+    def look_at_newest(self, choices: Mapping[str, RunEntry]) -> None:
+        """Looks at the newest run of the server among the choices, if none of them was chosen."""
+        if self.shown not in choices:
+            self.shown = next((key for key, run in choices.items() if run.job), "")
+
+    def run(self, key: str) -> RunEntry | None:
+        """The run of a key; None: there is none any more."""
+        return self.choices().get(key)
+
+    def finished(self, folder: Path) -> FinishedRun:
+        """The results in a folder, read once.
+
+        Raises:
+            CdprError: There are none that can be read.
+        """
+        if folder not in self._finished:
+            while len(self._finished) >= 4:
+                self._finished.pop(next(iter(self._finished)))
+            self._finished[folder] = FinishedRun(folder)
+        return self._finished[folder]
+
+
+def outcome_words(sample: dict[str, Any] | None, summary: dict[str, Any] | None) -> str:
+    """How a run stands or ended, as in its summary: running, converged, target_lost, ..."""
+    return str((summary or sample or {}).get("outcome", ""))
+
+
+def _told(path: Path) -> Any:
+    """What a file of JSON beside a folder says; None: nothing that can be read."""
+    try:
+        state = path.lstat()
+    except OSError:
+        return None
+    return _read(path, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=4 * MOST_FOLDERS)
+def _read(path: Path, changed: int, size: int) -> Any:
+    """What a file says that was changed last then, and has that size."""
+    with suppress(OSError, ValueError):
+        if path.is_file() and not path.is_symlink() and size <= LARGEST_FILE:
+            return load_json(path.read_text(encoding="utf-8"))
+    return None
