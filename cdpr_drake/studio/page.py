@@ -17,8 +17,8 @@ from cdpr_drake.studio.panel_pages import PanelPages
 from cdpr_drake.studio.panels.panel import message, on_page, show_errors
 from cdpr_drake.studio.panels.table import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench.session import Workbench
 
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 

@@ -16,7 +16,7 @@ from nicegui import background_tasks, ui
 
 from cdpr_drake.studio.panels.panel import place_remarks, show_errors
 from cdpr_drake.studio.panels.table import PANELS
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 
 BETWEEN = 0.02
 """Between two panels that are placed, for what the browser asks meanwhile [s]."""

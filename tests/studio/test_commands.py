@@ -19,7 +19,7 @@ from cdpr_drake.studio.workbench.finished_studies import study_folder
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.workspace_regions import (
+from cdpr_drake.studio.workspace import (
     PLANE,
     UNKNOWN,
     Plane,

@@ -8,10 +8,10 @@ import zipfile
 from contextlib import asynccontextmanager
 
 from cdpr_drake.studio.panels.run import run_panel
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.job_manager import JobManager
 from cdpr_drake.studio.workbench.run_job import RunJob
-from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, shown, simulated, until
 

@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from cdpr_drake.studio.panels.workspace import _views
 from cdpr_drake.studio.workbench.job import JobState
+from cdpr_drake.studio.workspace import _views
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT = "acrobot_small"

@@ -11,12 +11,13 @@ from weakref import WeakKeyDictionary
 from nicegui import run, ui
 
 from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS
+from cdpr_drake.studio.numbers import fact_rows, fact_table, number_words, plain_table
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
 from cdpr_drake.studio.panels.moving_plots import MovingPlots
-from cdpr_drake.studio.panels.numbers import fact_rows, fact_table, number_words, plain_table
 from cdpr_drake.studio.panels.panel import notify, robot_argument, show_errors
 from cdpr_drake.studio.panels.result_names import LOG
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.job import JobState
@@ -30,7 +31,6 @@ from cdpr_drake.studio.workbench.recorded_logs import (
     read_comparison,
 )
 from cdpr_drake.studio.workbench.result_subject import Subject
-from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""

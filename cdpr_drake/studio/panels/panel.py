@@ -16,9 +16,9 @@ from nicegui import background_tasks, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.workbench.calculator import Signal
+from cdpr_drake.studio.calculator import Signal
+from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 from cdpr_drake.studio.workbench.result_subject import Subject
-from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
 
 
 @dataclass(frozen=True)

@@ -23,14 +23,14 @@ from cdpr_drake.studio.panels.panel import on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.result_names import COMPARED, RUN
 from cdpr_drake.studio.panels.run_watch import RUN_STYLE, RunWatch
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
+from cdpr_drake.studio.scene import RobotScene, RunScene
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.finished_run import zipped
 from cdpr_drake.studio.workbench.job import JobState
 from cdpr_drake.studio.workbench.result_subject import Subject, subject_of
 from cdpr_drake.studio.workbench.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.workbench.run_job import RunJob
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
-from cdpr_drake.studio.workbench.scene import RobotScene, RunScene
-from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from nicegui import run, ui
 
+from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.panels.moving_plots import MovingPlots, Row
-from cdpr_drake.studio.panels.numbers import pair_table
 from cdpr_drake.studio.panels.panel import show_errors
 from cdpr_drake.studio.workbench.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.workbench.job import JobState, Listener

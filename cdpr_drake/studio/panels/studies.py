@@ -10,11 +10,12 @@ from weakref import WeakKeyDictionary
 from nicegui import run, ui
 
 from cdpr_drake.analyses.studies.study import STUDIES
+from cdpr_drake.studio.numbers import fact_table
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.panels.job_bar import JobBar
-from cdpr_drake.studio.panels.numbers import fact_table
 from cdpr_drake.studio.panels.panel import notify, show_errors
 from cdpr_drake.studio.panels.result_names import STUDY
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.command_board import CommandBoard
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 from cdpr_drake.studio.workbench.finished_studies import (
@@ -24,7 +25,6 @@ from cdpr_drake.studio.workbench.finished_studies import (
     study_folders,
 )
 from cdpr_drake.studio.workbench.result_subject import Subject
-from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cdpr_drake.studio.panels.panel import Panel
 from cdpr_drake.studio.panels.result_names import COMPARED, LOG, RUN, STUDY, WORKSPACES
-from cdpr_drake.studio.workbench.session import POSE_NUMBERS
+from cdpr_drake.studio.session import POSE_NUMBERS
 
 _ROOM = "cdpr_drake.studio.panels"
 
@@ -13,14 +13,19 @@ PANELS = {
     for panel in (
         Panel("robot", "Robot", "precision_manufacturing", {}, f"{_ROOM}.robot", "robot_panel"),
         Panel(
-            "pose", "Pose", "open_with", {POSE_NUMBERS: "Numbers"}, f"{_ROOM}.pose", "pose_panel"
+            "pose",
+            "Pose",
+            "open_with",
+            {POSE_NUMBERS: "Numbers"},
+            "cdpr_drake.studio.pose",
+            "pose_panel",
         ),
         Panel(
             "workspace",
             "Workspace",
             "view_in_ar",
             {WORKSPACES: "Workspaces"},
-            f"{_ROOM}.workspace",
+            "cdpr_drake.studio.workspace",
             "workspace_panel",
         ),
         Panel(

@@ -1,9 +1,6 @@
-from .calculator import Calculator as Calculator
 from .document import Document as Document
-from .pose_answer import PoseAnswer as PoseAnswer
 from .result_subject import Results as Results
 from .result_subject import Subject as Subject
 from .robot_files import exported as exported
 from .scenario_draft import ROBOT as ROBOT
-from .session import Workbench as Workbench
 from .yaml_edit import has as has
