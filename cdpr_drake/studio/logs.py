@@ -27,8 +27,8 @@ from cdpr_drake.studio.panel import LOG, robot_argument, show_errors
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
 from cdpr_drake.studio.results import Subject
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import CommandResults, View, place_image, show_results
-from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 
 RESULTS = "logs"

@@ -21,8 +21,8 @@ from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.door import SESSION
 from cdpr_drake.studio.panel import PANELS, message, on_page, place_remarks, show_errors
 from cdpr_drake.studio.scene_relay import SCENE
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench.session import Workbench
 
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 

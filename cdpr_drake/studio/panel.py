@@ -16,8 +16,8 @@ from nicegui import background_tasks, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.workbench.calculator import Signal
-from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
+from cdpr_drake.studio.calculator import Signal
+from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 
 WORKSPACES, RUN, COMPARED, LOG, STUDY = "workspaces", "run", "compared", "log", "study"
 """Names of results: computed workspaces, the run that is shown, the one behind it, a log beside the
@@ -56,9 +56,9 @@ class Panel:
 
 PANELS = {
     "robot": Panel("Robot", "precision_manufacturing", "panels.robot:robot_panel", {}),
-    "pose": Panel("Pose", "open_with", "panels.pose:pose_panel", {POSE_NUMBERS: "Numbers"}),
+    "pose": Panel("Pose", "open_with", "pose:pose_panel", {POSE_NUMBERS: "Numbers"}),
     "workspace": Panel(
-        "Workspace", "view_in_ar", "panels.workspace:workspace_panel", {WORKSPACES: "Workspaces"}
+        "Workspace", "view_in_ar", "workspace:workspace_panel", {WORKSPACES: "Workspaces"}
     ),
     "run": Panel(
         "Run", "play_circle", "run:run_panel",

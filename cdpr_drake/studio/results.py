@@ -14,7 +14,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.workbench.calculator import Signal
+from cdpr_drake.studio.calculator import Signal
 
 FINGERPRINT = 8
 """Digits of a digest that are shown; two of a thousand robots share them about once in 10,000."""

@@ -19,10 +19,10 @@ from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch, SceneOfRuns, SteeringBar
 from cdpr_drake.studio.workbench.scenario_draft import ROBOT
-from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 

@@ -17,7 +17,7 @@ import aiohttp
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 
 from cdpr_drake.studio.door import SESSION
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 
 SCENE = "/scene/"
 PAGE = "meshcat.html"

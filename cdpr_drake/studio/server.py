@@ -16,14 +16,20 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
-from cdpr_drake.studio.door import EVERYWHERE, IS_TOKEN, TOKEN, TOKEN_WORDS, Door
+from cdpr_drake.studio.calculator import Calculator
+from cdpr_drake.studio.door import (
+    EVERYWHERE,
+    IS_TOKEN,
+    TOKEN,
+    TOKEN_WORDS,
+    Door,
+)
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
+from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench.calculator import Calculator
 from cdpr_drake.studio.workbench.command_form import CommandForm
-from cdpr_drake.studio.workbench.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LONGEST_ABSENCE = 30.0

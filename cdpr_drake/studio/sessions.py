@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 
 MOST_SESSIONS = 24
 """Workbenches that are kept; of more, those go that no page shows, the oldest first."""

@@ -15,8 +15,8 @@ from cdpr_drake.studio.boards import CommandBoard
 from cdpr_drake.studio.panel import STUDY, show_errors
 from cdpr_drake.studio.panels.command_fields import CommandFields, Filled
 from cdpr_drake.studio.results import Subject
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import CommandResults, View, changed, place_figure, read_results
-from cdpr_drake.studio.workbench.session import Workbench
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""

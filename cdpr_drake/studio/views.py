@@ -26,9 +26,9 @@ from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.boards import CommandBoard, CommandEntry
 from cdpr_drake.studio.job_bar import JobBar
 from cdpr_drake.studio.jobs import Job, JobState
+from cdpr_drake.studio.numbers import fact_rows, number_words, plain_table
 from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.panels.command_fields import CommandFields
-from cdpr_drake.studio.panels.numbers import fact_rows, number_words, plain_table
 from cdpr_drake.studio.workbench.command_form import FieldProblem
 
 RESULTS = ("results.json", "summary.json")

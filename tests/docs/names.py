@@ -16,7 +16,7 @@ from cdpr_drake.analyses.runs.seeds import Repetition
 from cdpr_drake.analyses.templates import FILES, file_schema
 from cdpr_drake.geometry.cable_set import CableSet
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 
 ROOT = Path(__file__).parents[2]
 

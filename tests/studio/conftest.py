@@ -124,7 +124,7 @@ def _watch(event, arguments):
         return
     name = os.fsdecode(path)
     if (
-        name.endswith((".py", ".pyc", ".so"))
+        name.endswith((".py", ".pyc", ".so", ".js"))
         or name == sys.argv[0]  # where warnings look for lines
         or "site-packages" in name
         or name.startswith(sys.base_prefix)

@@ -7,10 +7,10 @@ from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
 
 from cdpr_drake.cli.command_forms import command_forms
+from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.page import make_page
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench.calculator import Calculator
-from cdpr_drake.studio.workbench.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 

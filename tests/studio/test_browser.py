@@ -5,7 +5,7 @@ import json
 import pytest
 
 from cdpr_drake.cli.app import main
-from cdpr_drake.studio.workbench.session import USUAL_ROBOT
+from cdpr_drake.studio.session import USUAL_ROBOT
 from tests.chromium import LONGEST_WAIT, cleared, complaints, wait_for
 from tests.models.formats.foreign_files import caspr
 from tests.studio.run_page import press

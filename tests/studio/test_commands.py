@@ -13,7 +13,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.workspace_regions import (
+from cdpr_drake.studio.workspace import (
     PLANE,
     UNKNOWN,
     Plane,

@@ -1,5 +1,6 @@
 """The static workspace that follows a robot while it is changed."""
 
+import asyncio
 import json
 import threading
 
@@ -8,13 +9,12 @@ import pytest
 
 from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.workbench import live_workspace, workspace_sketch
-from cdpr_drake.studio.workbench import session as sessions
-from cdpr_drake.studio.workbench.live_workspace import COARSE, FINE, REST
-from cdpr_drake.studio.workbench.scene import SHADER, WORKSPACE, RobotScene
-from cdpr_drake.studio.workbench.session import POSE_NUMBERS, Workbench
+from cdpr_drake.studio import live_workspace
+from cdpr_drake.studio import session as sessions
+from cdpr_drake.studio.live_workspace import COARSE, FINE, REST, sketch_grid, sketch_workspace
+from cdpr_drake.studio.scene import SHADER, WORKSPACE, RobotScene
+from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.workspace_sketch import SketchWork, sketch_grid
 from tests.studio.pages import field, type_into, until
 
 ROBOT = "acrobot_large"
@@ -39,7 +39,7 @@ def in_scene(bench, path=WORKSPACE):
 
 
 def whole(robot, poses=COARSE):
-    return SketchWork(robot, poses).go_on(10 * poses)
+    return next(sketch_workspace(robot, poses))
 
 
 def test_a_sketch_is_what_the_command_computes(bench, tmp_path, capsys):
@@ -66,9 +66,9 @@ def test_grids_have_about_the_poses_that_are_wanted(name, poses):
 
 def test_pieces_make_the_same_as_the_whole():
     robot = load_robot("acrobot_large")
-    work, found = SketchWork(robot, COARSE), None
-    while found is None:
-        found = work.go_on(100)
+    *early, found = sketch_workspace(robot, COARSE, 100)
+    assert early == [None] * len(early)
+    assert len(early) > 5
     assert found.volume == whole(robot).volume
     np.testing.assert_array_equal(found.solid[0], whole(robot).solid[0])
 
@@ -81,7 +81,7 @@ def test_it_is_drawn_when_a_point_moves_and_not_before(bench):
     assert not bench.live.is_fine
     bench.drag_point("exit", 0, FARTHER, done=False)
     assert bench.live.sketch.volume != coarse.volume
-    bench.live.refine()
+    asyncio.run(bench.live.refine())
     assert bench.live.is_fine
     assert np.prod(bench.live.sketch.counts) > 10 * np.prod(coarse.counts)
     bench.drag_point("exit", 0, THERE, done=False)
@@ -130,12 +130,11 @@ def test_a_robot_without_a_static_workspace_says_why(tmp_path):
 async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, user, monkeypatch):
     computed, bench = [], held.bench
 
-    class Counted(SketchWork):
-        def __init__(self, robot, poses):
-            computed.append((poses, robot.cables[0].exit_point[0]))
-            super().__init__(robot, poses)
+    def counted(robot, poses, at_once=None):
+        computed.append((poses, robot.cables[0].exit_point[0]))
+        return sketch_workspace(robot, poses, at_once)
 
-    monkeypatch.setattr(workspace_sketch, "SketchWork", Counted)
+    monkeypatch.setattr(live_workspace, "sketch_workspace", counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
     places = np.linspace(-0.45, -0.3, 31)
     for x in places:
@@ -193,18 +192,10 @@ def test_who_moves_a_point_seldom_is_not_resting(bench, monkeypatch):
     clock, waits = [0.0], []
     monkeypatch.setattr(live_workspace.time, "monotonic", lambda: clock[0])
 
-    class Loop:
-        def call_later(self, wait, _):
-            waits.append(wait)
-
     for between in (10.0, 0.1, 0.8, 5.0):
         clock[0] += between
         bench.live.follow(bench.robot.value)
-        bench.live.compute()
-        bench.live.sketch = None
-        with monkeypatch.context() as patch:
-            patch.setattr(live_workspace.asyncio, "get_running_loop", Loop)
-            bench.live.take()
+        waits.append(bench.live._rest())
     assert waits == [REST, REST, pytest.approx(1.6), REST]
 
 

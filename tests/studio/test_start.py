@@ -12,8 +12,8 @@ from tests.studio.pages import opened_page
 LATER = (
     "matplotlib", "cv2", "scipy.optimize", "scipy.spatial", "pydrake.systems.analysis",
     "cdpr_drake.cli.command_forms", "cdpr_drake.analyses.visualization",
-    "cdpr_drake.studio.panels.workspace", "cdpr_drake.studio.run",
-    "cdpr_drake.studio.workbench.scene", "cdpr_drake.studio.workbench.pose_solver",
+    "cdpr_drake.studio.workspace", "cdpr_drake.studio.run",
+    "cdpr_drake.studio.scene", "cdpr_drake.analyses.tensions",
 )  # fmt: skip
 """What the page with its first panel needs none of, and takes long to import."""
 

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.panels.workspace import _views
+from cdpr_drake.studio.workspace import _views
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT = "acrobot_small"

@@ -7,9 +7,8 @@ from html import escape
 from nicegui import ui
 
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
 from cdpr_drake.studio.panel import on_page, show_errors
-from cdpr_drake.studio.panels.live_workspace import live_workspace_bar
-from cdpr_drake.studio.panels.point_dragging import add_point_dragging
 from cdpr_drake.studio.panels.robot_beside import RobotBeside
 from cdpr_drake.studio.panels.robot_dialogs import (
     export_dialog,
@@ -19,7 +18,7 @@ from cdpr_drake.studio.panels.robot_dialogs import (
     text_dialog,
 )
 from cdpr_drake.studio.panels.schema_tables import SchemaGroups
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 
 FIRST = ("cables", "platform", "tension_bounds")
 OPENED = ("cables", "tension_bounds")

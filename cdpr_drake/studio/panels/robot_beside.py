@@ -7,9 +7,9 @@ from concurrent.futures import Future
 from nicegui import ui
 
 from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.panel import on_page, show_errors
-from cdpr_drake.studio.panels.numbers import pair_table
-from cdpr_drake.studio.workbench.session import Workbench
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.side_by_side import Pair, robots_side_by_side
 
 NOTHING = "none"

@@ -13,6 +13,7 @@ from nicegui import events, run, ui
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.panel import message, notify, show_errors
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,
@@ -21,7 +22,6 @@ from cdpr_drake.studio.workbench.robot_files import (
     export_formats,
     exported,
 )
-from cdpr_drake.studio.workbench.session import Workbench
 
 
 @contextmanager

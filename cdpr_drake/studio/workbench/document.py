@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from cdpr_drake.studio.workbench.calculator import Signal
+from cdpr_drake.studio.calculator import Signal
 
 T = TypeVar("T")
 

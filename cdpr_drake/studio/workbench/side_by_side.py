@@ -10,8 +10,7 @@ import numpy as np
 
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import settings_of
-from cdpr_drake.studio.workbench.pose_answer import PoseAnswer
-from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
+from cdpr_drake.studio.pose_answer import PoseAnswer, RobotQuestions
 
 Value = float | str | None
 

@@ -1,24 +1,6 @@
-"""Exit and anchor points that are dragged in the scene, parallel to the screen.
-
-The scene comes from the same address as the page, so the page may look at what Meshcat draws: it
-finds the point under the pointer, moves it in the plane through it that faces the camera, and tells
-where in W it is. While it is dragged all numbers follow; when it is let go, that is one change of
-the document.
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-import numpy as np
-from nicegui import events, ui
-
-from cdpr_drake.studio.panel import notify, show_errors
-from cdpr_drake.studio.workbench.session import Workbench
-
-MOVED = "studio_point"
-
-SCRIPT = """
+// Exit and anchor points that are dragged in the scene, parallel to the screen. The scene comes from
+// the same address as the page, so the page may look at what Meshcat draws: it finds the point under
+// the pointer, moves it in the plane through it that faces the camera, and tells where in W it is.
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
@@ -142,40 +124,3 @@ SCRIPT = """
   frame().addEventListener('load', listen);
   listen();
 })();
-"""
-
-
-def add_point_dragging(bench: Workbench) -> None:
-    """Lets the points in the page's scene be dragged."""
-
-    def moved(event: events.GenericEventArguments) -> None:
-        with show_errors():
-            point = _read(event.args, len(bench.robot.value.cables))
-            if point is None:
-                return
-            kind, number, at, done = point
-            words = bench.drag_point(kind, number, at, done)
-            if words:
-                notify(words)
-
-    ui.on(MOVED, moved)
-    client = ui.context.client
-    client.on_connect(lambda: ui.run_javascript(SCRIPT))
-    if client.has_socket_connection:  # the panel is placed after the page has come
-        ui.run_javascript(SCRIPT)
-
-
-def _read(found: Any, count: int) -> tuple[str, int, np.ndarray, bool] | None:
-    """Kind, number of the cable, p_W [m], and whether it was let go; None for what is no such."""
-    if not isinstance(found, dict):
-        return None
-    kind, number, at = found.get("kind"), found.get("number"), found.get("at")
-    if kind not in ("exit", "anchor") or not isinstance(number, int) or not 0 <= number < count:
-        return None
-    try:
-        p_W = np.array(at, float)
-    except (TypeError, ValueError):
-        return None
-    if p_W.shape != (3,) or not np.all(np.isfinite(p_W)):
-        return None
-    return kind, number, p_W, bool(found.get("done"))

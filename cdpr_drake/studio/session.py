@@ -1,4 +1,4 @@
-"""What one browser session works on."""
+"""What one browser session works on: a robot, its file, a pose, and what is known there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import asyncio
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -21,21 +20,25 @@ from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.calculator import Calculator, Signal
 from cdpr_drake.studio.jobs import JobManager
+from cdpr_drake.studio.live_workspace import LiveWorkspace
+from cdpr_drake.studio.pose_answer import (
+    USUAL_METHOD,
+    PoseAnswer,
+    RobotQuestions,
+    axis_values,
+    pose_at,
+)
 from cdpr_drake.studio.results import Results, Subject, subject_of
-from cdpr_drake.studio.workbench.calculator import Calculator, Signal
 from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.document import Document
-from cdpr_drake.studio.workbench.live_workspace import LiveWorkspace
-from cdpr_drake.studio.workbench.pose_answer import USUAL_METHOD, PoseAnswer
-from cdpr_drake.studio.workbench.pose_axes import axis_values, pose_at
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
-from cdpr_drake.studio.workbench.robot_questions import RobotQuestions
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 
 if TYPE_CHECKING:  # it takes a second of the start
-    from cdpr_drake.studio.workbench.scene import Draw, RobotScene
+    from cdpr_drake.studio.scene import Draw, RobotScene
 
 USUAL_ROBOT = "acrobot_large"
 
@@ -44,7 +47,6 @@ POSE_NUMBERS = "pose-numbers"
 
 LATE = 0.5
 """Time after which numbers that are of the pose before, or the robot before, are called so [s]."""
-
 
 TELL = 0.1
 """Time by which the numbers are behind the scene while a point is dragged [s]: a browser builds
@@ -63,9 +65,10 @@ class Workbench:
         coordinates: Of the platform's pose, as `pose_axes` has them [m, deg].
         X_WP: The pose.
         method: How tensions are distributed, a name of `tensions.METHODS`.
-        reference: Wanted tension for methods that need one [N].
+        reference: Desired tension for methods that need one [N].
         answer: What is known about the robot at a pose; None: nothing yet.
         problem: Why there is no answer, which is a mistake of this program; None: there is one.
+        is_computing: True while the answer is computed.
         answered: Called when there is another answer or problem.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
         panel: Name of the panel that was shown last.
@@ -74,18 +77,14 @@ class Workbench:
         results: What is shown of results, and what each is about.
         drawn: What the scene shows in the place of the robot; None: the robot.
         live: The static workspace that follows the robot while it is changed.
+        questions: What asks about the robot as it is now.
     """
 
     def __init__(
-        self,
-        folder: WorkingFolder,
-        robot: str = USUAL_ROBOT,
-        scenario: str = "",
-        *,
-        calculator: Calculator | None = None,
-        jobs: JobManager | None = None,
+        self, folder: WorkingFolder, robot: str = USUAL_ROBOT, scenario: str = "", *,
+        calculator: Calculator | None = None, jobs: JobManager | None = None,
         commands: Callable[[], Mapping[str, CommandForm]] = dict,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
         `commands` makes the forms of commands; it is asked at their first use.
@@ -100,36 +99,29 @@ class Workbench:
         self.robot: Document[Robot] = Document(
             robot_text(robot, "the studio"), where, self.files.read
         )
-        self._saved: dict[Path, str] = {}
+        self._texts: dict[Path, str] = {}  # of robot files
+        if where.is_file() and not is_foreign(where):  # of which a name with rails has another text
+            self._texts[where] = where.read_text(encoding="utf-8")
         self._assumed: dict[Path, list[str]] = {}
-        self._shipped: dict[Path, str] = {}
-        if robot in robot_names() or Path(robot).is_file():  # not with rails that the name moves
-            self._keep_shipped(where, self.robot.text)
-        is_own = where.is_relative_to(folder.root) and where.is_file() and not is_foreign(where)
-        if is_own:  # with rails that the name moves, the text is not that of the file
-            self._saved[where] = where.read_text(encoding="utf-8")
         self.method = USUAL_METHOD
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
         self.problem: BaseException | None = None
+        self.is_computing = False
         self.answered = Signal()
-        self.scenario = scenario
-        self.panel = ""
+        self.scenario, self.panel = scenario, ""
         self.dark: bool | None = None
         self.jobs = JobManager() if jobs is None else jobs
         self._make_commands = commands
-        self.coordinates: list[float] = []
-        self.X_WP: RigidTransform = self.robot.value.home.transform()
-        self._questions = RobotQuestions(self.robot.value)
-        self._about = subject_of(self.robot.value)
         self.results = Results(lambda: self.subject)
         self.drawn: Subject | None = None
-        self._busy = self._wanted = self._dragged = False
-        self._late: asyncio.TimerHandle | None = None
+        self._busy = self._again = self.is_dragged = False
+        self._answering: asyncio.Task[None] | None = None
         self._telling: asyncio.TimerHandle | None = None
         self._scene: RobotScene | None = None
         self._opened: Future[str] | None = None
-        self.live = LiveWorkspace(self.calculator.run, self.scene)
+        self.live = LiveWorkspace(self.calculator, self.scene)
+        self._take_robot(self.robot.value)
         self.go_home()
         self.robot.changed.connect(self._robot_changed)
 
@@ -139,27 +131,40 @@ class Workbench:
         return self._make_commands()
 
     @property
-    def file(self) -> str:
-        """Name of the robot's file in the folder; empty: it has none yet."""
-        path = self.robot.path
-        return self.folder.shown(path) if path in self._saved else ""
-
-    @property
     def subject(self) -> Subject:
         """The robot and the pose that are open: what a result should be about."""
         pose = tuple(float(value) for value in pose_row(self.X_WP))
         return replace(self._about, pose=pose)
 
-    def draws(self, subject: Subject | None) -> None:
-        """Says that the scene shows another robot than the one that is open; None: that one."""
-        if self.drawn != subject:
-            self.drawn = subject
-            self.results.changed.emit()
+    # The robot and its file
+
+    @property
+    def file(self) -> str:
+        """Name of the robot's file in the folder; empty: it has none yet."""
+        path = self.robot.path
+        own = path in self._texts and path.is_relative_to(self.folder.root)
+        return self.folder.shown(path) if own else ""
 
     @property
     def is_saved(self) -> bool:
         """Whether the robot's file has the robot as it is."""
-        return self._saved.get(self.robot.path) == self.robot.text
+        return self._texts.get(self.robot.path) == self.robot.text
+
+    @property
+    def command_name(self) -> str:
+        """By which commands know the robot as it is, in the folder; empty: they do not."""
+        if not self.is_saved:
+            return ""
+        name = self.robot.value.name
+        shipped = name in robot_names() and self.robot.path == robot_file(name).resolve()
+        return name if shipped else self.file
+
+    @property
+    def state(self) -> str:
+        """How the robot stands to its file, in a word or two."""
+        if self.file:
+            return "saved" if self.is_saved else "edited, not saved"
+        return "of the package" if self.command_name else "not saved"
 
     @property
     def assumed(self) -> list[str]:
@@ -171,28 +176,6 @@ class Workbench:
         self._assumed.pop(self.robot.path, None)
         self.robot.changed.emit()
 
-    @property
-    def state(self) -> str:
-        """How the robot stands to its file, in a word or two."""
-        if self.file:
-            return "saved" if self.is_saved else "edited, not saved"
-        if self.command_name:
-            return "of the package"
-        return "not saved"
-
-    @property
-    def command_name(self) -> str:
-        """By which commands know the robot as it is, in the folder; empty: they do not."""
-        name = self.robot.value.name
-        if name in robot_names() and self.robot.path == robot_file(name).resolve():
-            return name if self.robot.text == self._shipped.get(self.robot.path) else ""
-        return self.file if self.is_saved else ""
-
-    def _keep_shipped(self, path: Path, text: str) -> None:
-        """Remembers what a file of the package says, where it is one."""
-        if any(path == robot_file(name).resolve() for name in robot_names()):
-            self._shipped[path] = text
-
     def open(self, name: str) -> OpenedRobot:
         """Works with a robot of the package, or with a file of the folder.
 
@@ -200,20 +183,6 @@ class Workbench:
             CdprError: It is not accepted; nothing has changed.
         """
         return self.take_opened(self.files.open(name))
-
-    def take_opened(self, opened: OpenedRobot) -> OpenedRobot:
-        """Works with what `files.open` has read, which another thread may do."""
-        self._keep_shipped(opened.path, opened.text)
-        own = opened.path.is_relative_to(self.folder.root) and opened.path.is_file()
-        if own and not opened.notes:
-            self._saved[opened.path] = opened.text
-        self._take_opened(opened)
-        return opened
-
-    def _take_opened(self, opened: OpenedRobot) -> None:
-        if opened.notes:
-            self._assumed[opened.path] = opened.notes
-        self.robot.change(opened.text, opened.path)
 
     def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
         """Works with a robot from uploaded files, which has no file in the folder yet.
@@ -223,10 +192,21 @@ class Workbench:
         """
         return self.take_upload(self.files.upload(files))
 
+    def take_opened(self, opened: OpenedRobot) -> OpenedRobot:
+        """Works with what `files.open` has read, which another thread may do."""
+        if not opened.notes and opened.path.is_file():
+            self._texts[opened.path] = opened.text
+        return self._take(opened)
+
     def take_upload(self, opened: OpenedRobot) -> OpenedRobot:
         """Works with what `files.upload` has read, which another thread may do."""
-        self._saved.pop(opened.path, None)
-        self._take_opened(opened)
+        self._texts.pop(opened.path, None)
+        return self._take(opened)
+
+    def _take(self, opened: OpenedRobot) -> OpenedRobot:
+        if opened.notes:
+            self._assumed[opened.path] = opened.notes
+        self.robot.change(opened.text, opened.path)
         return opened
 
     def save(self, name: str, overwrite: bool) -> None:
@@ -237,103 +217,13 @@ class Workbench:
         """
         if not name.lower().endswith((".yaml", ".yml")):
             raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
-        path = self.folder.path(name)
-        self.files.read(self.robot.text, path)  # it may name files that are not there
-        text = self.robot.text
+        path, text = self.folder.path(name), self.robot.text
+        self.files.read(text, path)  # it may name files that are not there
         self.folder.write(name, text, overwrite or name == self.file)
-        self._saved[path] = text
+        self._texts[path] = text
         if self.assumed:
             self._assumed[path] = self.assumed
         self.robot.belongs_to(path)
-
-    def go_home(self) -> None:
-        """Puts the platform to the robot's home pose, without asking about it."""
-        robot = self.robot.value
-        self.X_WP = robot.home.transform()
-        self.coordinates = axis_values(robot, self.X_WP)
-
-    def move_to(self, coordinates: Sequence[float]) -> None:
-        """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
-        self._dragged = False  # also where a browser went away with a point in its hand
-        self.coordinates = [float(value) for value in coordinates]
-        self.X_WP = pose_at(self.robot.value, self.coordinates)
-        self.ask()
-
-    def ask(self) -> None:
-        """Asks what there is to know; `answered` tells. Of several questions the last counts."""
-        self.results.wait_for(POSE_NUMBERS)
-        self.results.changed.emit()
-        if self._busy:
-            self._wanted = True
-            return
-        self._busy, self._wanted = True, False
-        questions, X_WP, method, reference = (
-            self._questions, self.X_WP, self.method, self.reference
-        )  # fmt: skip
-        with suppress(RuntimeError):  # without an event loop the answer is there before
-            loop = asyncio.get_running_loop()
-            self._late = loop.call_later(LATE, self.results.end_wait, POSE_NUMBERS)
-        self._calculate(lambda: questions.at(X_WP, method, reference), self._take)
-
-    def _calculate(self, work: Callable[[], Any], done: Callable[[Future[Any]], None]) -> None:
-        """What is part of an answer: what cannot be begun ends it."""
-        try:
-            self.calculator.run(work, done)
-        except Exception:
-            self._busy = False
-            raise
-
-    def _take(self, future: Future[PoseAnswer]) -> None:
-        """Tells the numbers first and draws then; of what is dragged it draws first."""
-        self.problem = future.exception()
-        if self.problem is not None:  # the robot is drawn all the same, with grey cables
-            robot, X_WP = self._questions.robot, self.X_WP
-            unknown = np.full(len(robot.cables), np.nan)
-            self._calculate(lambda: self._show(robot, X_WP, unknown), lambda _: self._end())
-            return
-        answer = self.answer = future.result()
-        self.results.show(POSE_NUMBERS, subject_of(answer.robot, answer.X_WP))
-        if not self._dragged:
-            self.answered.emit()
-        X_WP, tensions = answer.X_WP, answer.tensions
-        self._calculate(lambda: self._show(answer.robot, X_WP, tensions), self._drawn)
-
-    def _show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
-        """Draws a robot and its workspace; in the calculator's thread.
-
-        All is computed before: what comes to the browser at once is one picture there, not two.
-        """
-        self.live.compute()
-        self.scene().show(robot, X_WP, tensions)
-        self.live.draw(self.scene())
-
-    def _drawn(self, future: Future[Any]) -> None:
-        self.problem = future.exception()
-        if not self._dragged:
-            self.live.take()
-        elif self._telling is None:
-            try:
-                self._telling = asyncio.get_running_loop().call_later(TELL, self._tell)
-            except RuntimeError:  # who has no event loop waits for nothing
-                self._tell()
-        self._end(self.problem is not None)
-
-    def _tell(self) -> None:
-        """Tells what there is to know about what is dragged."""
-        self._telling = None
-        self.live.take()
-        self.answered.emit()
-
-    def _end(self, tell: bool = True) -> None:
-        self._busy = False
-        if self._late is not None:
-            self._late.cancel()
-        if tell:
-            self.answered.emit()
-        if self._wanted:
-            self.ask()
-        else:
-            self.results.end_wait(POSE_NUMBERS)
 
     def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
         """Moves a point of a cable: for the numbers only, or in the document when it is let go.
@@ -347,11 +237,11 @@ class Workbench:
         Returns:
             Why it cannot be there, once it is let go; empty: it can.
         """
-        self._dragged = not done
+        self.is_dragged = not done
         robot = copy.deepcopy(self.robot.value)
         cable = robot.cables[number]
-        p = p_W if kind == "exit" else self.X_WP.inverse().multiply(p_W)
-        p = np.round(p if kind == "anchor" else cable.base_of(p), 4) + 0.0
+        p = cable.base_of(p_W) if kind == "exit" else self.X_WP.inverse().multiply(p_W)
+        p = np.round(p, 4) + 0.0
         if not done:
             setattr(cable, f"{kind}_point", p)
             self._take_robot(robot)
@@ -366,16 +256,11 @@ class Workbench:
             return "\n".join(self.robot.words(problem))
         return ""
 
-    @property
-    def questions(self) -> RobotQuestions:
-        """What asks about the robot as it is now."""
-        return self._questions
-
     def _take_robot(self, robot: Robot) -> None:
-        self._questions, self._about = RobotQuestions(robot), subject_of(robot)
+        self.questions, self._about = RobotQuestions(robot), subject_of(robot)
 
     def _robot_changed(self) -> None:
-        before, robot = self._questions.robot, self.robot.value
+        before, robot = self.questions.robot, self.robot.value
         self._take_robot(robot)
         self.live.follow(robot if robot.name == before.name else None)
         if robot.name != before.name or robot.motion != before.motion or self._is_outside():
@@ -390,6 +275,105 @@ class Workbench:
             np.any(p < lower) or np.any(p > upper) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
         )
 
+    # The pose, and what is known there
+
+    def go_home(self) -> None:
+        """Puts the platform to the robot's home pose, without asking about it."""
+        self.X_WP: RigidTransform = self.robot.value.home.transform()
+        self.coordinates = axis_values(self.robot.value, self.X_WP)
+
+    def move_to(self, coordinates: Sequence[float]) -> None:
+        """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
+        self.is_dragged = False  # also where a browser went away with a point in its hand
+        self.coordinates = [float(value) for value in coordinates]
+        self.X_WP = pose_at(self.robot.value, self.coordinates)
+        self.ask()
+
+    def ask(self) -> None:
+        """Asks what there is to know; `answered` tells. Of several questions the last counts.
+
+        Without an event loop it waits for the answer.
+        """
+        self._again = self.is_computing = True
+        self.results.wait_for(POSE_NUMBERS)
+        self.results.changed.emit()
+        if self._busy:
+            return
+        self._busy = True
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            asyncio.run(self._answer_all())
+            if self._telling is not None:
+                self._tell()
+        else:
+            self._answering = loop.create_task(self._answer_all())
+
+    async def _answer_all(self) -> None:
+        """Answers until nobody has asked again meanwhile."""
+        loop = asyncio.get_running_loop()
+        try:
+            while self._again:
+                self._again = False
+                late = loop.call_later(LATE, self.results.end_wait, POSE_NUMBERS)
+                try:
+                    await self._answer()
+                finally:
+                    late.cancel()
+        finally:
+            self._busy = self.is_computing = False
+            self.results.end_wait(POSE_NUMBERS)
+
+    async def _answer(self) -> None:
+        """Tells the numbers first and draws then; of what is dragged it draws first."""
+        questions, X_WP, method, reference = (
+            self.questions, self.X_WP, self.method, self.reference
+        )  # fmt: skip
+        tensions = np.full(len(questions.robot.cables), np.nan)
+        try:
+            answer = await self.calculator.result(lambda: questions.at(X_WP, method, reference))
+            self.answer, self.problem, tensions = answer, None, answer.tensions
+            self.is_computing = self._again
+            self.results.show(POSE_NUMBERS, subject_of(answer.robot, X_WP))
+            if not self.is_dragged:
+                self.answered.emit()
+        except Exception as problem:  # the robot is drawn all the same, with grey cables
+            self.problem = problem
+        try:
+            await self.calculator.result(lambda: self._show(questions.robot, X_WP, tensions))
+        except Exception as problem:
+            self.problem = problem
+        if self.problem is not None:
+            self.is_computing = self._again
+            self.answered.emit()
+        elif not self.is_dragged:
+            self.live.take()
+        elif self._telling is None:
+            self._telling = asyncio.get_running_loop().call_later(TELL, self._tell)
+
+    def _show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
+        """Draws a robot and its workspace; in the calculator's thread.
+
+        All is computed before: what comes to the browser at once is one picture there, not two.
+        """
+        self.live.compute()
+        self.scene().show(robot, X_WP, tensions)
+        self.live.draw(self.scene())
+
+    def _tell(self) -> None:
+        """Tells what there is to know about what is dragged."""
+        self._telling = None
+        self.live.take()
+        self.answered.emit()
+
+    # The scene
+
+    def draws(self, subject: Subject | None) -> None:
+        """Says that the scene shows another robot than the one that is open; None: that one."""
+        if self.drawn != subject:
+            self.drawn = subject
+            self.results.changed.emit()
+
     def draw(self, draw: Draw, done: Callable[[Future[Any]], Any] | None = None) -> None:
         """Draws into the scene, in the calculator's thread; `done` as for `Calculator.run`."""
         self.calculator.run(lambda: draw(self.scene()), done)
@@ -397,7 +381,7 @@ class Workbench:
     def scene(self) -> RobotScene:
         """The scene, made at the first call; for the calculator's thread only."""
         if self._scene is None:
-            from cdpr_drake.studio.workbench.scene import RobotScene
+            from cdpr_drake.studio.scene import RobotScene
 
             self._scene = RobotScene()
         return self._scene

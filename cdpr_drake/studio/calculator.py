@@ -1,9 +1,8 @@
 """One thread for numbers and scenes, so that the page never waits for them, and signals of changes.
 
-Compiled kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat
-takes calls from the thread only that made it. So all of that happens in one thread, the
-`Calculator`'s, beside that of the server, which answers pages. `Signal` tells who listens that
-something has changed.
+Kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat takes calls
+only from the thread that made it. All of that happens in the thread of the `Calculator`, beside the
+server's, which answers pages.
 """
 
 from __future__ import annotations
@@ -34,6 +33,22 @@ class Calculator:
         """Whether a piece of work takes so long that people should be told."""
         return monotonic() - self._since > LATE
 
+    def submit(self, work: Callable[[], T]) -> Future[T]:
+        """Does some work, whoever may wait for it."""
+
+        def timed() -> T:
+            self._since = monotonic()
+            try:
+                return work()
+            finally:
+                self._since = inf
+
+        return self._executor.submit(timed)
+
+    async def result(self, work: Callable[[], T]) -> T:
+        """What some work returns."""
+        return await asyncio.wrap_future(self.submit(work))
+
     def run(self, work: Callable[[], T], done: Callable[[Future[T]], Any] | None = None) -> None:
         """Does some work, and calls `done` with its future in the caller's event loop.
 
@@ -47,29 +62,16 @@ class Calculator:
             if done is not None:
                 done(future)
             return
-        if done is not None:
-            future.add_done_callback(lambda one: _post(loop, done, one))
 
-    def submit(self, work: Callable[[], T]) -> Future[T]:
-        """Does some work, whoever may wait for it."""
+        def post(future: Future[T]) -> None:
+            if done is not None and not loop.is_closed() and not future.cancelled():
+                loop.call_soon_threadsafe(done, future)
 
-        def timed() -> T:
-            self._since = monotonic()
-            try:
-                return work()
-            finally:
-                self._since = inf
-
-        return self._executor.submit(timed)
+        future.add_done_callback(post)
 
     def close(self) -> None:
         """Ends the thread, once the work under way is done."""
         self._executor.shutdown(wait=True, cancel_futures=True)
-
-
-def _post(loop: asyncio.AbstractEventLoop, done: Callable[..., Any], future: Future[Any]) -> None:
-    if not loop.is_closed() and not future.cancelled():
-        loop.call_soon_threadsafe(done, future)
 
 
 Listener = Callable[[], None]
@@ -80,16 +82,15 @@ class Signal:
 
     def __init__(self) -> None:
         """Without any."""
-        self._listeners: dict[int, Listener] = {}
-        self._next = 0
+        self._listeners: dict[object, Listener] = {}
 
     def connect(self, listener: Listener) -> Callable[[], None]:
         """Calls `listener` from now on; what is returned ends that, also when called twice."""
-        number, self._next = self._next, self._next + 1
-        self._listeners[number] = listener
+        key = object()
+        self._listeners[key] = listener
 
         def disconnect() -> None:
-            self._listeners.pop(number, None)
+            self._listeners.pop(key, None)
 
         return disconnect
 
