@@ -327,9 +327,6 @@ class JobManager:
         """Whether a job works."""
         return self._count() > 0
 
-    def _count(self) -> int:
-        return sum(job.state in (JobState.RUNNING, JobState.STOPPING) for job in self.jobs)
-
     def submit(self, job: J) -> J:
         """Takes a job over, and begins it when there is room.
 
@@ -371,8 +368,10 @@ class JobManager:
 
     def _begin_next(self) -> None:
         for job in self.jobs:
-            working = sum(each.state in (JobState.RUNNING, JobState.STOPPING) for each in self.jobs)
-            if self._closed or working >= self.at_once:
+            if self._closed or self._count() >= self.at_once:
                 return
             if job.state == JobState.QUEUED:
                 job.begin()
+
+    def _count(self) -> int:
+        return sum(job.state in (JobState.RUNNING, JobState.STOPPING) for job in self.jobs)
