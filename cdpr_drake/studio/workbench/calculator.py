@@ -11,14 +11,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from math import inf
-from time import monotonic
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-
-LATE = 0.3
-"""Time after which a piece of work is waited for [s]."""
 
 
 class Calculator:
@@ -27,12 +22,6 @@ class Calculator:
     def __init__(self) -> None:
         """Starts nothing yet."""
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="calculator")
-        self._since = inf
-
-    @property
-    def is_late(self) -> bool:
-        """Whether a piece of work takes so long that people should be told."""
-        return monotonic() - self._since > LATE
 
     def run(self, work: Callable[[], T], done: Callable[[Future[T]], Any] | None = None) -> None:
         """Does some work, and calls `done` with its future in the caller's event loop.
@@ -52,15 +41,7 @@ class Calculator:
 
     def submit(self, work: Callable[[], T]) -> Future[T]:
         """Does some work, whoever may wait for it."""
-
-        def timed() -> T:
-            self._since = monotonic()
-            try:
-                return work()
-            finally:
-                self._since = inf
-
-        return self._executor.submit(timed)
+        return self._executor.submit(work)
 
     def close(self) -> None:
         """Ends the thread, once the work under way is done."""
