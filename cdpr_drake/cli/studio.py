@@ -55,17 +55,14 @@ def studio(
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
     from cdpr_drake.studio.server import serve
 
-    serve(
-        opened, folder=folder, host=host, port=port, token=token, commands=_command_forms,
-        **({"ready": _open_browser} if browser else {}),
-    )  # fmt: skip
+    def commands() -> Mapping[str, CommandForm]:
+        """Forms, which import most of the package: not before the page is there."""
+        from cdpr_drake.cli.command_forms import command_forms
 
+        return command_forms()
 
-def _command_forms() -> Mapping[str, CommandForm]:
-    """The forms of commands, which import most of the package: not before the page is there."""
-    from cdpr_drake.cli.command_forms import command_forms
-
-    return command_forms()
+    ready = _open_browser if browser else lambda address: None
+    serve(opened, folder=folder, host=host, port=port, token=token, ready=ready, commands=commands)
 
 
 def _wanted_token(no_token: bool) -> str | None:

@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -41,38 +41,29 @@ LARGEST_FILE = 100_000
 """Of such a file that is read [bytes]."""
 
 
+J = TypeVar("J", bound=Job)
+
+
 @dataclass(frozen=True)
-class Left:
-    """What is in a results folder and in the files beside it.
+class Entry(Generic[J]):
+    """Results that are there, or come.
 
     Attributes:
+        folder: The results folder.
+        name: What people see.
+        job: The newest job that works in the folder, as long as the server has it.
         asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
             or it is done.
         about: Name and digest of the robot that it is about; empty: not known.
         is_whole: Whether all results are there.
     """
 
+    folder: Path
+    name: str = ""
+    job: J | None = None
     asked: tuple[str, ...] = ()
     about: Mapping[str, str] = field(default_factory=dict)
     is_whole: bool = False
-
-
-J = TypeVar("J", bound=Job)
-
-
-@dataclass(frozen=True)
-class Entry(Left, Generic[J]):
-    """Results that are there, or come.
-
-    Attributes:
-        name: What people see.
-        job: The newest job that works in the folder, as long as the server has it.
-        folder: The results folder.
-    """
-
-    name: str = ""
-    job: J | None = None
-    folder: Path = Path()
 
     def scenario(self) -> Any | None:
         """The scenario of a run; None: it is not known any more.
@@ -104,19 +95,12 @@ class Board(Generic[J]):
         self, jobs: JobManager, root: Path, name: str, kind: type[J],
         is_whole: Callable[[Path], bool],
     ) -> None:  # fmt: skip
-        """With the server's jobs and the working folder.
-
-        Args:
-            jobs: The jobs.
-            root: The working folder.
-            name: As the attribute.
-            kind: Class of the jobs that work there.
-            is_whole: Whether all results are in a folder.
-        """
+        """With the server's jobs of a kind and the working folder; `is_whole` says whether all
+        results are in a folder."""
         self._jobs, self._root, self.name = jobs, root, name
         self._kind, self._is_whole = kind, is_whole
         self.shown = ""
-        self._left: dict[Path, Left] = {}
+        self._left: dict[Path, Entry[J]] = {}
         self._looks, self._looked = False, -LOOK_PERIOD
 
     @property
@@ -141,16 +125,15 @@ class Board(Generic[J]):
         for job in reversed(self._jobs.jobs):
             folder = job.folder
             if isinstance(job, self._kind) and folder and folder.parent == self.folder:
-                left = self._left.get(folder, Left())
-                unfinished = job.state in (JobState.FAILED, JobState.STOPPED)
-                asked = left.asked if unfinished else ()
-                name = f"{folder.name}, {job.state.value}"
-                found.setdefault(
-                    folder.name, Entry(asked, left.about, left.is_whole, name, job, folder)
-                )
-        for folder, left in self._left.items():
-            name = f"{folder.name}, stopped" if left.asked else folder.name
-            found.setdefault(folder.name, Entry(**vars(left), name=name, folder=folder))
+                there = self._left.get(folder) or Entry(folder)
+                goes_on = job.state in (JobState.FAILED, JobState.STOPPED)
+                entry = replace(
+                    there, name=f"{folder.name}, {job.state.value}", job=job,
+                    asked=there.asked if goes_on else (),
+                )  # fmt: skip
+                found.setdefault(folder.name, entry)
+        for folder, there in self._left.items():
+            found.setdefault(folder.name, there)
         return found
 
     def _look(self) -> None:
@@ -162,8 +145,15 @@ class Board(Generic[J]):
         finally:
             self._looks, self._looked = False, time.monotonic()
 
-    def _read(self, folder: Path) -> Left:
-        return Left(self._how(folder), self._about(folder), self._is_whole(folder))
+    def _read(self, folder: Path) -> Entry[J]:
+        words, about = (_told(self._beside(folder, ending)) for ending in (ASKED, ABOUT))
+        fits = isinstance(words, list) and all(isinstance(word, str) for word in words)
+        asked = tuple(words) if fits and self._may_run(words) else ()
+        fits = isinstance(about, dict) and all(isinstance(each, str) for each in about.values())
+        return Entry(
+            folder, f"{folder.name}, stopped" if asked else folder.name, asked=asked,
+            about=about if fits else {}, is_whole=self._is_whole(folder),
+        )  # fmt: skip
 
     def _results(self) -> list[Path]:
         """Folders with results, whole or not, the newest first; none that a link leads to."""
@@ -178,17 +168,6 @@ class Board(Generic[J]):
 
     def _beside(self, folder: Path, ending: str) -> Path:
         return self.folder / f".{folder.name}{ending}"
-
-    def _about(self, folder: Path) -> dict[str, str]:
-        told = _told(self._beside(folder, ABOUT))
-        fits = isinstance(told, dict) and all(isinstance(value, str) for value in told.values())
-        return told if fits else {}
-
-    def _how(self, folder: Path) -> tuple[str, ...]:
-        """How a folder was asked for; empty where that is not known, or nothing to be run."""
-        told = _told(self._beside(folder, ASKED))
-        fits = isinstance(told, list) and all(isinstance(word, str) for word in told)
-        return tuple(told) if fits and self._may_run(told) else ()
 
     def _may_run(self, words: Sequence[str]) -> bool:
         """Whether arguments from a file are such as a page would make."""
@@ -214,12 +193,9 @@ class CommandBoard(Board[Job]):
     def start(
         self, name: str, arguments: Sequence[str], about: Mapping[str, str] | None = None
     ) -> Job:
-        """Begins a command with results in a new folder, and looks at it.
+        """Begins a command with results in a new folder of that name, and looks at it.
 
-        Args:
-            name: Of the folder.
-            arguments: Of the command, without --out and --json.
-            about: Name and digest of the robot that it is about; None: no robot.
+        `arguments` are without --out and --json; `about` is name and digest of its robot.
         """
         folder = self._jobs.free_folder(self.folder / name)
         with suppress(OSError):  # a full disk, say: the command will tell
@@ -290,11 +266,9 @@ class RunBoard(Board[RunJob]):
         return self.draft
 
     async def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
-        """Begins a run of the draft, and looks at it.
+        """Begins a run of the draft, perhaps standing at the start, and looks at it.
 
-        Args:
-            paused: Whether it stands at the start.
-            by_hand: Whether cables can be broken and the platform pushed while it runs.
+        `by_hand`: cables can be broken and the platform pushed while it runs.
 
         Raises:
             CdprError: The draft is not accepted.

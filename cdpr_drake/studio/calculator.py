@@ -10,14 +10,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
-from math import inf
-from time import monotonic
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-
-LATE = 0.3
-"""Time after which a piece of work is waited for [s]."""
 
 
 class Calculator:
@@ -26,24 +21,10 @@ class Calculator:
     def __init__(self) -> None:
         """Starts nothing yet."""
         self._executor = ThreadPoolExecutor(1, thread_name_prefix="calculator")
-        self._since = inf
-
-    @property
-    def is_late(self) -> bool:
-        """Whether a piece of work takes so long that people should be told."""
-        return monotonic() - self._since > LATE
 
     def submit(self, work: Callable[[], T]) -> Future[T]:
         """Does some work, whoever may wait for it."""
-
-        def timed() -> T:
-            self._since = monotonic()
-            try:
-                return work()
-            finally:
-                self._since = inf
-
-        return self._executor.submit(timed)
+        return self._executor.submit(work)
 
     async def result(self, work: Callable[[], T]) -> T:
         """What some work returns."""

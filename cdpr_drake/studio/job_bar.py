@@ -13,14 +13,8 @@ class JobBar:
     """Which results are looked at, how far the command is, and what it may be asked for."""
 
     def __init__(self, board: CommandBoard, label: str) -> None:
-        """Places it into the current slot.
-
-        Args:
-            board: What the session looks at.
-            label: Of the list of results.
-        """
+        """Places it into the current slot, with a label of the list of results."""
         self._board = board
-        self._names: dict[str, str] = {}
         name = board.name
         with ui.row().classes("w-full items-center no-wrap"):
             self._choice = ui.select({}, label=label, on_change=self._choose)
@@ -42,34 +36,29 @@ class JobBar:
 
     def refresh(self) -> None:
         """Follows jobs and folders."""
-        choices = self._board.choices()
-        if self._board.shown not in choices:
-            self._board.shown = next(iter(choices), "")
+        board, choices = self._board, self._board.choices()
+        if board.shown not in choices:
+            board.shown = next(iter(choices), "")
         names = {key: computed.name for key, computed in choices.items()}
-        if names != self._names:
-            self._names = names
-            self._choice.set_options(names, value=self._board.shown or None)
-        elif self._choice.value != (self._board.shown or None):
-            self._choice.value = self._board.shown or None
-        self._show(choices.get(self._board.shown))
-
-    def _show(self, computed: CommandEntry | None) -> None:
+        if names != self._choice.options:
+            self._choice.set_options(names, value=board.shown or None)
+        self._choice.value = board.shown or None
+        computed = choices.get(board.shown)
         job = None if computed is None else computed.job
+        asked = () if computed is None else computed.asked
         working = job is not None and not job.state.is_over
-        asked = () if computed is None or working else computed.asked
         self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)
         self._go_on.set_visibility(bool(asked))
         self._bar.set_visibility(working)
-        words = "stopped with an earlier server" if asked and job is None else ""
-        if job is not None:
-            fraction, said = job.progress
-            self._bar.props(remove="indeterminate", add="indeterminate" if fraction is None else "")
-            self._bar.value = fraction or 0.0
-            last = job.lines[-1] if working and not said and job.lines else ""
-            parts = [job.state.value, f"{job.elapsed:.0f} s", job.message or said or last]
-            words = ", ".join(part for part in parts if part)
-        if self._state.text != words:
-            self._state.text = words
+        if job is None:
+            self._state.text = "stopped with an earlier server" if asked else ""
+            return
+        fraction, said = job.progress
+        self._bar.props(remove="indeterminate", add="indeterminate" if fraction is None else "")
+        self._bar.value = fraction or 0.0
+        last = job.lines[-1] if working and job.lines else ""
+        parts = [job.state.value, f"{job.elapsed:.0f} s", job.message or said or last]
+        self._state.text = ", ".join(part for part in parts if part)
 
     def _choose(self) -> None:
         if self._choice.value and self._choice.value != self._board.shown:
@@ -77,14 +66,12 @@ class JobBar:
             self.refresh()
 
     def _ask_to_stop(self) -> None:
-        computed = self.computed
-        if computed is not None and computed.job is not None:
-            computed.job.stop()
-            self.refresh()
+        if self.computed is not None and self.computed.job is not None:
+            self.computed.job.stop()
+        self.refresh()
 
     def _ask_to_go_on(self) -> None:
-        computed = self.computed
         with show_errors():
-            if computed is not None:
-                self._board.go_on(computed)
-                self.refresh()
+            if self.computed is not None:
+                self._board.go_on(self.computed)
+            self.refresh()

@@ -30,15 +30,13 @@ COMMAND = (sys.executable, "-P", "-m", "cdpr_drake")
 """The command line; Python does not look for modules in the working folder: what lies there is
 data."""
 
-PROGRESS_PERIOD = "CDPR_PROGRESS_PERIOD"
-"""Environment variable of the time between lines of progress [s], see `cli.terminal`."""
+PROGRESS_PERIOD, PROGRESS = "CDPR_PROGRESS_PERIOD", "progress: "
+"""Environment variable of the time between lines of progress [s], and how such a line begins, see
+`cli.terminal`."""
 
 LIFELINE = "CDPR_LIFELINE"
 """Environment variable of the file descriptor at which a command sees the end of who started it,
 see `cli.process`."""
-
-PROGRESS = "progress: "
-"""How a line of progress begins, see `cli.terminal`."""
 
 LOOK_PERIOD = 0.1
 """Time between looks at what a process says [s]."""
@@ -70,13 +68,8 @@ class JobError(CdprError):
 class JobState(StrEnum):
     """How a job stands."""
 
-    QUEUED = "queued"
-    RUNNING = "running"
-    PAUSED = "paused"
-    STOPPING = "stopping"
-    FINISHED = "finished"
-    FAILED = "failed"
-    STOPPED = "stopped"
+    QUEUED, RUNNING, PAUSED, STOPPING = "queued", "running", "paused", "stopping"
+    FINISHED, FAILED, STOPPED = "finished", "failed", "stopped"
 
     @property
     def is_over(self) -> bool:
@@ -235,8 +228,10 @@ class Job:
             self._hear(err, ended=True)
             return ending.result()
         finally:
-            self._signal(signal.SIGKILL)  # where the event loop has ended
             os.close(self._lifeline)
+            if self._process is not None and self._process.returncode is None:
+                self._signal(signal.SIGKILL)  # the event loop is ending
+                await self._process.wait()
 
     async def _start(
         self, out: IO[bytes], err: IO[bytes], kept: Sequence[int], more: Sequence[str] = ()
@@ -330,7 +325,7 @@ class JobManager:
     @property
     def is_busy(self) -> bool:
         """Whether a job works."""
-        return any(job.state in (JobState.RUNNING, JobState.STOPPING) for job in self.jobs)
+        return self._count() > 0
 
     def submit(self, job: J) -> J:
         """Takes a job over, and begins it when there is room.
@@ -373,8 +368,10 @@ class JobManager:
 
     def _begin_next(self) -> None:
         for job in self.jobs:
-            working = sum(each.state in (JobState.RUNNING, JobState.STOPPING) for each in self.jobs)
-            if self._closed or working >= self.at_once:
+            if self._closed or self._count() >= self.at_once:
                 return
             if job.state == JobState.QUEUED:
                 job.begin()
+
+    def _count(self) -> int:
+        return sum(job.state in (JobState.RUNNING, JobState.STOPPING) for job in self.jobs)

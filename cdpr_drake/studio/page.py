@@ -42,8 +42,8 @@ STYLE = (
 BETWEEN = 0.02
 """Between two panels that are placed, for what the browser asks meanwhile [s]."""
 
-BUSY_TICK = 0.2
-"""Between two looks whether something is computed [s]."""
+WORK_TICK = 0.2
+"""Between two looks whether a job works [s]."""
 
 
 def session_of(request: Request) -> str:
@@ -82,7 +82,7 @@ def _build(bench: Workbench) -> None:
             tabs.props("dense inline-label mobile-arrows outside-arrows no-caps")
             for key, panel in PANELS.items():
                 ui.tab(key, label=panel.title, icon=panel.icon).mark(f"tab-{key}")
-        _place_busy_sign(bench)
+        _place_work_sign(bench)
         _place_subject(bench)
         turn = ui.button(icon="contrast").props("flat round dense color=white")
         turn.mark("dark-or-light").props('aria-label="Dark or light" title="Dark or light"')
@@ -111,21 +111,14 @@ def _build(bench: Workbench) -> None:
     ui.context.client.on_connect(ask_for_dark)
 
 
-def _place_busy_sign(bench: Workbench) -> None:
-    """Says in every tab that numbers are computed, or that a job works."""
-    sign = ui.row().classes("studio-busy").props('role="status"').mark("busy")
+def _place_work_sign(bench: Workbench) -> None:
+    """Says in every tab that a job of the server works, whoever has begun it."""
+    sign = ui.row().classes("studio-busy").props('role="status"').mark("job-at-work")
     with sign:
         ui.spinner(size="1.1rem", color="white")
-        words = ui.label()
-
-    def refresh() -> None:
-        works = "job at work" if bench.jobs.is_busy else ""
-        said = "computing" if bench.calculator.is_late else works
-        words.text = said or words.text
-        sign.set_visibility(bool(said))
-
-    refresh()
-    ui.timer(BUSY_TICK, refresh)
+        ui.label("job at work")
+    sign.visible = False
+    ui.timer(WORK_TICK, lambda: sign.set_visibility(bench.jobs.is_busy))
 
 
 def _place_subject(bench: Workbench) -> None:

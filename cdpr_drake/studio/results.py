@@ -60,14 +60,13 @@ class Subject:
 
 def subject_of(robot: Robot, X_WP: RigidTransform | None = None) -> Subject:
     """What a result about a robot is about, at a pose if there is one."""
-    data = json.dumps(dataclasses.asdict(robot), default=_plain, sort_keys=True)
-    digest = hashlib.sha256(data.encode()).hexdigest()
+
+    def plain(value: Any) -> Any:
+        return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
+
+    data = json.dumps(dataclasses.asdict(robot), default=plain, sort_keys=True)
     pose = None if X_WP is None else tuple(float(value) for value in pose_row(X_WP))
-    return Subject(robot.name, digest, pose)
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
+    return Subject(robot.name, hashlib.sha256(data.encode()).hexdigest(), pose)
 
 
 class Results:
@@ -80,7 +79,7 @@ class Results:
     def __init__(self, now: Callable[[], Subject]) -> None:
         """Of a workbench; `now` says what is open there."""
         self._now, self.changed = now, Signal()
-        self._shown: dict[str, Subject] = {}
+        self._shown: dict[str, Subject | None] = {}
         self._awaited: set[str] = set()
 
     def wait_for(self, name: str) -> None:
@@ -95,13 +94,9 @@ class Results:
 
     def show(self, name: str, subject: Subject | None) -> None:
         """Says what the result of a name is about from now on; None: there is none any more."""
-        if self._shown.get(name) == subject:
-            return
-        if subject is None:
-            del self._shown[name]
-        else:
+        if self._shown.get(name) != subject:
             self._shown[name] = subject
-        self.changed.emit()
+            self.changed.emit()
 
     def subject(self, name: str) -> Subject | None:
         """What a result is about; None: there is none."""

@@ -120,15 +120,9 @@ class RunJob(Job):
         speed: float | None = None,
         paused: bool = False,
     ) -> None:
-        """Not begun.
+        """Not begun; at a speed in simulated seconds per second, None: as fast as possible.
 
-        Args:
-            scenario: As the attribute.
-            working: Folder that it is run in, from which paths count.
-            folder: Where its results will be.
-            settings: As the attribute.
-            speed: Simulated seconds per second; None: as fast as possible.
-            paused: Whether it stands at the start until it is told to go.
+        `paused`: it stands at the start until it is told to go.
 
         Raises:
             JobError: The speed is not accepted.

@@ -6,8 +6,9 @@ from urllib.request import HTTPCookieProcessor, build_opener
 
 from nicegui import ElementFilter
 
+from cdpr_drake.studio.jobs import Job
 from cdpr_drake.studio.panel import PANELS, Panel
-from tests.studio.pages import opened_page
+from tests.studio.pages import opened_page, shown, until
 
 LATER = (
     "matplotlib", "cv2", "scipy.optimize", "scipy.spatial", "pydrake.systems.analysis",
@@ -57,3 +58,14 @@ async def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(tmp_pat
         said = list(user.notify.messages)
     assert dict(zip(PANELS, there, strict=True)) == {name: name != "pose" for name in PANELS}
     assert any("no_such" in words for words in said), said
+
+
+async def test_a_sign_says_that_a_job_works(tmp_path):
+    async with opened_page(tmp_path) as (user, bench, _):
+        assert not shown(user, "job-at-work")
+        job = Job("job", ["import time; time.sleep(3600)"], tmp_path)
+        job.program = (sys.executable, "-c")
+        bench.jobs.submit(job)
+        await until(lambda: shown(user, "job-at-work"))
+        await bench.jobs.close()
+        await until(lambda: not shown(user, "job-at-work"))
