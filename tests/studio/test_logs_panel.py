@@ -26,7 +26,7 @@ def work(tmp_path_factory, alone):
     shutil.copytree(alone, folder / "runs" / "short")
     log = pd.read_csv(alone / "log.csv")
     log.loc[6:, "time_s"] += 2.0
-    log["lengths.C1_m"] += OFFSET
+    log[["lengths.C1_m", "unstrained_lengths.C1_m"]] += OFFSET
     log.to_csv(folder / "wrong.csv", index=False)
     (folder / "notes.txt").write_text("not a log\n")
     return folder
