@@ -169,7 +169,9 @@ def log_contents(path: Path) -> tuple[View, bytes]:
     """
     log, picture = import_log(path), io.BytesIO()
     log.plot().savefig(picture, format="png", dpi=DOTS)
-    return View.of(log.as_dict()), picture.getvalue()
+    return View.of(
+        log.as_dict(), most_rows=len(log.ledger) + len(log.frame.columns)
+    ), picture.getvalue()
 
 
 def is_comparison(folder: Path) -> bool:

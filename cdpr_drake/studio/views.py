@@ -78,8 +78,10 @@ class View:
     files: Mapping[str, Path] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, data: Mapping[str, Any], folder: Path | None = None) -> View:
-        """Of a command's numbers as JSON, and perhaps the files of its folder."""
+    def of(
+        cls, data: Mapping[str, Any], folder: Path | None = None, most_rows: int = MOST_ROWS
+    ) -> View:
+        """Of a command's numbers as JSON with so many rows of its tables, and perhaps its files."""
         tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
         statements = [
             {str(key): _words(value) for key, value in row.items()}
@@ -87,7 +89,7 @@ class View:
         ]
         rest = {key: value for key, value in data.items() if key not in tables}
         facts = [(name, _words(value)) for name, value in leaves(rest)]
-        shown = dict(_table(key, rows) for key, rows in tables.items())
+        shown = dict(_table(key, rows, most_rows) for key, rows in tables.items())
         return cls(facts, statements, shown, folder, {} if folder is None else _files(folder))
 
     @property
@@ -203,9 +205,9 @@ def _rows(key: str, value: Any) -> list[Mapping[str, Any]]:
     return [{key: name, **row} for name, row in value.items()] if alike else []
 
 
-def _table(key: str, rows: list[Mapping[str, Any]]) -> tuple[str, Words]:
+def _table(key: str, rows: list[Mapping[str, Any]], most: int) -> tuple[str, Words]:
     single = [name for name, value in rows[0].items() if not isinstance(value, list | dict)]
-    single, shown = single[:MOST_COLUMNS], rows[:MOST_ROWS]
+    single, shown = single[:MOST_COLUMNS], rows[:most]
     heads = [_plain(name) + (f" [{unit}]" if (unit := unit_of(name)) else "") for name in single]
     count = f"{len(rows)}" if len(shown) == len(rows) else f"the first {len(shown)} of {len(rows)}"
     cells = [[_words(row.get(name)) for name in single] for row in shown]
