@@ -126,6 +126,7 @@ async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, b
     bench.draws(None)
     await until(in_scene)
     (work / "workspaces" / ".small.about.json").unlink()
+    await until(lambda: not _views[bench].board.choices()["small"].about)
     _views[bench].take(None)
     await workspaces(user, bench)
     await until(lambda: "whether it was as it is now is not known" in said(user, "workspaces"))
