@@ -2,13 +2,14 @@
 
 `serve` starts it. `server` starts NiceGUI behind a `Door`, which asks for a cookie that whoever has
 the token gets, and tells sessions by it; `scene_relay` relays Drake's Meshcat to the same address.
-`page` is the page, `panel` the table of its panels with what connects them to a workbench; these
-and `panels` know NiceGUI, nothing else does.
+`page` is the page, `panel` the table of its panels with what connects them to a workbench. `session`
+is what a browser session works on; `pose` and `workspace` are a panel each with what it shows.
 
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
   knows no page; what shows it connects to its signals.
 * `Document` is the robot as a text with undo and redo, changed only by what the checks accept.
-* `PoseAnswer` is what is computed at the pose, by the functions that the commands ask.
+* `PoseAnswer` is what is computed at the pose, by the verbs; `LiveWorkspace` the static workspace
+  that follows a robot while it is changed. `RobotScene` draws both; `dragging.js` moves points.
 * `Calculator` is the one thread that has kernels and Meshcat, so that a page never waits for a
   compiler; of several questions it answers the last.
 * `Subject` is the robot and pose that a result is about; the page says above each panel what is

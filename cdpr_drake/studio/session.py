@@ -7,7 +7,7 @@ import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,8 +135,6 @@ class Workbench:
         """The robot and the pose that are open: what a result should be about."""
         pose = tuple(float(value) for value in pose_row(self.X_WP))
         return replace(self._about, pose=pose)
-
-    # The robot and its file
 
     @property
     def file(self) -> str:
@@ -275,8 +273,6 @@ class Workbench:
             np.any(p < lower) or np.any(p > upper) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
         )
 
-    # The pose, and what is known there
-
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""
         self.X_WP: RigidTransform = self.robot.value.home.transform()
@@ -326,12 +322,11 @@ class Workbench:
 
     async def _answer(self) -> None:
         """Tells the numbers first and draws then; of what is dragged it draws first."""
-        questions, X_WP, method, reference = (
-            self.questions, self.X_WP, self.method, self.reference
-        )  # fmt: skip
+        questions, X_WP = self.questions, self.X_WP
+        at_pose = partial(questions.at, X_WP, self.method, self.reference)
         tensions = np.full(len(questions.robot.cables), np.nan)
         try:
-            answer = await self.calculator.result(lambda: questions.at(X_WP, method, reference))
+            answer = await self.calculator.result(at_pose)
             self.answer, self.problem, tensions = answer, None, answer.tensions
             self.is_computing = self._again
             self.results.show(POSE_NUMBERS, subject_of(answer.robot, X_WP))
@@ -365,8 +360,6 @@ class Workbench:
         self._telling = None
         self.live.take()
         self.answered.emit()
-
-    # The scene
 
     def draws(self, subject: Subject | None) -> None:
         """Says that the scene shows another robot than the one that is open; None: that one."""
