@@ -164,7 +164,7 @@ def read_results(folder: Path) -> View:
         if path.stat().st_size > LARGEST_RESULTS:
             raise CdprError(f"{name}: is larger than {LARGEST_RESULTS} bytes")
         data = load_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
+    except (OSError, ValueError) as problem:
         raise CdprError(f"{name}: cannot be read: {problem}") from problem
     if not isinstance(data, dict):
         raise CdprError(f"{name}: found no results of a command")
