@@ -22,6 +22,7 @@ def study(tmp_path):
     results = {
         "study": "some", "quick": True, "spread_m": 1.25, "rows": {"done": 3, "of": 4},
         "statements": [STATEMENT, STATEMENT | {"verdict": "in part"}],
+        "parts": {"a": {"x": 1}, "b": {"y": 2}},
         "cables": {"C1": {"length_m": 0.5}, "C2": {"length_m": None}},
         "runs": [{"seed": k, "summary": {"no": 1}} for k in range(100)],
     }  # fmt: skip
@@ -37,7 +38,7 @@ def test_a_folder_has_facts_verdicts_tables_and_files(study):
     results = read_results(study)
     assert results.facts == [
         ("study", "some"), ("quick", "yes"), ("spread [m]", "1.25"), ("rows done", "3"),
-        ("rows of", "4"),
+        ("rows of", "4"), ("parts a x", "1"), ("parts b y", "2"),
     ]  # fmt: skip
     assert results.verdicts() == "1 confirmed, 1 in part"
     assert results.remarks() == "short form"
