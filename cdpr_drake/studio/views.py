@@ -110,8 +110,8 @@ class View:
         verdicts = [statement.get("verdict", "") for statement in self.statements]
         return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
 
-    def place(self) -> None:
-        """Places it into the current slot."""
+    def place(self, unfolded: bool = False) -> None:
+        """Places it into the current slot, with its numbers unfolded or folded."""
         if self.remarks():
             ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
         if self.statements:
@@ -121,7 +121,8 @@ class View:
         if self.facts:
             tables = {"Numbers": fact_rows(self.facts)} | tables
         for title, html in tables.items():
-            with ui.expansion(title).classes("w-full studio-group"):
+            is_open = unfolded and title == "Numbers"
+            with ui.expansion(title, value=is_open).classes("w-full studio-group"):
                 content = ui.html(html, sanitize=False).classes("w-full")
                 content.mark(f"table-{title.partition(',')[0].replace(' ', '-')}")
         if self.figures:
