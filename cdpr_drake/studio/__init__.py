@@ -2,8 +2,9 @@
 
 `serve` starts it. `server` starts NiceGUI behind a `Door`, which asks for a cookie that whoever has
 the token gets, and tells sessions by it; `scene_relay` relays Drake's Meshcat to the same address.
-`page` is the page, `panel` the table of its panels with what connects them to a workbench. `session`
-is what a browser session works on; `pose` and `workspace` are a panel each with what it shows.
+`page` is the page, `panel` the table of its panels with what connects them to a workbench.
+`session` is what a browser session works on. `robot`, `pose`, `workspace`, `run`, `logs` and
+`studies` are the panels.
 
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
   knows no page; what shows it connects to its signals.
@@ -14,8 +15,8 @@ is what a browser session works on; `pose` and `workspace` are a panel each with
   compiler; of several questions it answers the last.
 * `Subject` is the robot and pose that a result is about; the page says above each panel what is
   about another one.
-* `views` shows what any command left: numbers, verdicts, tables, figures, pages, files. `run`,
-  `logs` and `studies` are panels; `RunWatch` shows a run that goes on or is finished alike, with
+* `views` shows what any command left: numbers, verdicts, tables, figures, pages, files.
+  `RunWatch` shows a run that goes on or is finished alike, with
   `MovingPlots` of its samples or of the rows of its log (`FinishedRun`).
 * `SchemaGroups` makes forms from schemas. `PANELS` is the table of panels.
 * `Job` is any `cdpr` command in a process of its own, `RunJob` a `cdpr simulate` that is followed

@@ -122,8 +122,8 @@ class _LogsPanel:
             if read is not None and name == self._view.log:
                 contents, picture = read
                 with ui.expansion("What is in the log", value=True).classes("w-full studio-group"):
+                    contents.place(unfolded=True)
                     place_image(picture, Path("columns of the log over time.png"))
-                    contents.place()
 
     def _start(self) -> None:
         with show_errors():

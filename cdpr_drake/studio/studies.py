@@ -57,8 +57,9 @@ class _StudiesPanel:
         bench.results.show(STUDY, Subject(""))
         self._in_gallery: tuple[tuple[Path, float], ...] = ()
         with ui.row().classes("w-full items-center no-wrap"):
-            name = ui.select(list(STUDIES), label="study", with_input=True).bind_value(view, "name")
+            name = ui.select(list(STUDIES), value=view.name, label="study", with_input=True)
             name.props("dense outlined").classes("col").mark("study")
+            name.on_value_change(lambda event: setattr(view, "name", event.value or ""))
             start = ui.button("Start", icon="play_circle", on_click=self._start)
             start.props("no-caps").mark("start-study")
         words = "A study that is stopped keeps its finished rows, and can be continued."

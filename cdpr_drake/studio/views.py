@@ -109,8 +109,8 @@ class View:
         verdicts = [statement.get("verdict", "") for statement in self.statements]
         return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
 
-    def place(self) -> None:
-        """Places it into the current slot."""
+    def place(self, unfolded: bool = False) -> None:
+        """Places it into the current slot, with its numbers unfolded or folded."""
         if self.remarks():
             ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
         if self.statements:
@@ -120,7 +120,8 @@ class View:
         if self.facts:
             tables = {"Numbers": fact_rows(self.facts)} | tables
         for title, html in tables.items():
-            with ui.expansion(title).classes("w-full studio-group"):
+            is_open = unfolded and title == "Numbers"
+            with ui.expansion(title, value=is_open).classes("w-full studio-group"):
                 content = ui.html(html, sanitize=False).classes("w-full")
                 content.mark(f"table-{title.partition(',')[0].replace(' ', '-')}")
         if self.figures:
@@ -163,7 +164,7 @@ def read_results(folder: Path) -> View:
         if path.stat().st_size > LARGEST_RESULTS:
             raise CdprError(f"{name}: is larger than {LARGEST_RESULTS} bytes")
         data = load_json(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as problem:
+    except (OSError, ValueError) as problem:
         raise CdprError(f"{name}: cannot be read: {problem}") from problem
     if not isinstance(data, dict):
         raise CdprError(f"{name}: found no results of a command")

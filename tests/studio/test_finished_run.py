@@ -40,6 +40,8 @@ def test_what_is_no_run_is_refused(alone, tmp_path):
     (broken / "log.npz").write_bytes(b"PK no archive")
     with pytest.raises(OutputFolderError, match="broken: cannot be read"):
         FinishedRun(broken)
+    (broken / "log.npz").unlink()
+    assert not is_run(broken)
 
 
 def test_a_run_beside_another_has_numbers_of_both(alone):

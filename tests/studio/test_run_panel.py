@@ -7,7 +7,7 @@ import sys
 import zipfile
 from contextlib import asynccontextmanager
 
-from cdpr_drake.studio.jobs import JobManager, JobState
+from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.run import run_panel
 from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.session import Workbench
@@ -33,7 +33,11 @@ def says(user, name, words):
     return shown(user, name) and words in field(user, name).text
 
 
-async def test_a_wrong_value_is_said_at_its_field_and_nothing_starts(tmp_path):
+async def test_a_wrong_value_starts_nothing_and_a_run_fails_or_is_found_again(
+    tmp_path, monkeypatch
+):
+    words = "import sys; print('cdpr: no space left on device', file=sys.stderr); sys.exit(2)"
+    monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", words))
     async with opened_panel(tmp_path) as (user, bench):
         duration = field(user, "field-duration")
         duration.value = "-3"
@@ -44,18 +48,17 @@ async def test_a_wrong_value_is_said_at_its_field_and_nothing_starts(tmp_path):
         assert bench.jobs.jobs == []
         duration.value = "0.2"
         await until(lambda: not duration.props.get("error"))
-
-
-async def test_a_run_that_fails_is_a_message_and_the_next_one_starts(tmp_path, monkeypatch):
-    words = "import sys; print('cdpr: no space left on device', file=sys.stderr); sys.exit(2)"
-    monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", words))
-    async with opened_panel(tmp_path) as (user, bench):
-        for count in (1, 2):
-            user.find(marker="start").click()
-            await until(lambda count=count: len(bench.jobs.jobs) == count)
-            await until(lambda: bench.jobs.jobs[-1].state == JobState.FAILED)
-            await until(lambda: says(user, "run-problem", "no space left on device"))
-            assert field(user, "run-state").text == "failed"
+        user.find(marker="start").click()
+        await until(lambda: says(user, "run-problem", "no space left on device"))
+        assert field(user, "run-state").text == "failed"
+        words = "import time; time.sleep(3600)"
+        monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", words))
+        user.find(marker="start").click()
+        await until(lambda: says(user, "run-state", "starting"))
+        await user.open("/")  # another tab, or the same one anew
+        await until(lambda: says(user, "run-state", "starting"))
+        user.find(marker="stop").click()
+        await until(lambda: says(user, "run-state", "stopped"))
 
 
 async def test_a_finished_run_is_looked_at_compared_and_downloaded(alone, tmp_path):
@@ -80,14 +83,3 @@ async def test_a_finished_run_is_looked_at_compared_and_downloaded(alone, tmp_pa
         data = await user.download.next(timeout=1200.0)
         with zipfile.ZipFile(io.BytesIO(data.content)) as archive:
             assert archive.read("first/log.csv") == (alone / "log.csv").read_bytes()
-
-
-async def test_a_second_tab_and_a_reload_find_the_run(tmp_path, monkeypatch):
-    monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", "import time; time.sleep(3600)"))
-    async with opened_panel(tmp_path) as (user, _):
-        user.find(marker="start").click()
-        await until(lambda: says(user, "run-state", "starting"))
-        await user.open("/")
-        await until(lambda: says(user, "run-state", "starting"))
-        user.find(marker="stop").click()
-        await until(lambda: says(user, "run-state", "stopped"))

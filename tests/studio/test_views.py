@@ -8,7 +8,7 @@ import pytest
 from nicegui import ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.views import read_results, show_results, zipped
+from cdpr_drake.studio.views import read_results, show_results
 from tests.studio.pages import field, shown, simulated, until
 
 STATEMENT = {"words": "<b>says</b>", "printed": "1", "found": "2", "verdict": "confirmed"}
@@ -22,6 +22,7 @@ def study(tmp_path):
     results = {
         "study": "some", "quick": True, "spread_m": 1.25, "rows": {"done": 3, "of": 4},
         "statements": [STATEMENT, STATEMENT | {"verdict": "in part"}],
+        "parts": {"a": {"x": 1}, "b": {"y": 2}},
         "cables": {"C1": {"length_m": 0.5}, "C2": {"length_m": None}},
         "runs": [{"seed": k, "summary": {"no": 1}} for k in range(100)],
     }  # fmt: skip
@@ -37,7 +38,7 @@ def test_a_folder_has_facts_verdicts_tables_and_files(study):
     results = read_results(study)
     assert results.facts == [
         ("study", "some"), ("quick", "yes"), ("spread [m]", "1.25"), ("rows done", "3"),
-        ("rows of", "4"),
+        ("rows of", "4"), ("parts a x", "1"), ("parts b y", "2"),
     ]  # fmt: skip
     assert results.verdicts() == "1 confirmed, 1 in part"
     assert results.remarks() == "short form"
@@ -58,14 +59,7 @@ def test_broken_results_are_one_message(tmp_path, words):
         read_results(tmp_path)
 
 
-def test_the_archive_has_every_file_and_follows_no_link(study):
-    with zipfile.ZipFile(io.BytesIO(zipped(study))) as archive:
-        names = {"results.json", "a.svg", "replay.html", ".hidden"}
-        assert {f"some/{name}" for name in names} == set(archive.namelist())
-        assert archive.read("some/replay.html") == b"<p>moves</p>"
-
-
-async def test_a_user_sees_verdicts_and_figures_and_nothing_in_them_is_run(study):
+async def test_a_user_sees_verdicts_figures_and_files_and_nothing_in_them_is_run(study):
     def page():
         ui.label("A page")
         ui.timer(0.0, lambda: show_results(study), once=True)
@@ -75,16 +69,14 @@ async def test_a_user_sees_verdicts_and_figures_and_nothing_in_them_is_run(study
         words = field(user, "statements").content
         assert "confirmed" in words
         assert "&lt;b&gt;says" in words
-        assert "image/svg+xml" in await content(user, "shown-figure")
+        await until(lambda: shown(user, "shown-figure"))
+        assert "image/svg+xml" in field(user, "shown-figure").content
         field(user, "page-replay.html").value = True
         await until(lambda: shown(user, "result-page"))
         page = field(user, "result-page").props
         assert (page["srcdoc"], page["sandbox"]) == ("<p>moves</p>", "allow-scripts")
         user.find("All as a zip archive").click()
         sent = await user.download.next(timeout=1200.0)
-        assert zipfile.ZipFile(io.BytesIO(sent.content)).namelist()
-
-
-async def content(user, name):
-    await until(lambda: shown(user, name))
-    return field(user, name).content
+        with zipfile.ZipFile(io.BytesIO(sent.content)) as archive:  # which follows no link
+            names = {"results.json", "a.svg", "replay.html", ".hidden"}
+            assert {f"some/{name}" for name in names} == set(archive.namelist())
