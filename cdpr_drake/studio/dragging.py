@@ -68,7 +68,8 @@ def busy_sign(bench: Workbench) -> None:
     sign = ui.spinner(size="1.3em").props('role="status" aria-label="Computing"').mark("busy")
 
     def refresh() -> None:
-        sign.set_visibility(bench.is_computing and not bench.is_dragged)
+        first = bench.answer is None and bench.problem is None
+        sign.set_visibility(first or (bench.is_computing and not bench.is_dragged))
 
     refresh()
     on_page(bench.results.changed, refresh)
