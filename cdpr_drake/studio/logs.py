@@ -118,7 +118,8 @@ class _LogsPanel:
             try:
                 read = await run.io_bound(log_contents, self._bench.folder.path(name))
             finally:
-                sign.delete()
+                if not sign.is_deleted:  # another log was chosen meanwhile
+                    sign.delete()
             if read is not None and name == self._view.log:
                 contents, picture = read
                 with ui.expansion("What is in the log", value=True).classes("w-full studio-group"):

@@ -251,9 +251,10 @@ async def show_results(folder: Path) -> None:
     sign = ui.spinner(size="lg")
     with show_errors():
         view = await run.io_bound(read_results, folder)
-        if view is not None:  # else the server is ending
+        if view is not None and not sign.is_deleted:  # the server is not ending, the place is there
             view.place()
-    sign.delete()
+    if not sign.is_deleted:
+        sign.delete()
 
 
 def _statements(statements: list[dict[str, str]]) -> str:
