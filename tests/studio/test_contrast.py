@@ -5,7 +5,7 @@ import re
 import pytest
 
 from cdpr_drake.palette import rgb
-from cdpr_drake.studio.page import STYLE
+from cdpr_drake.studio.page import PALETTE, STYLE
 
 LEAST = 4.5
 PAGES = {"body": "#ffffff", "body.body--dark": "#121212"}
@@ -24,7 +24,8 @@ def contrast(one, other):
 
 def said(selector, what):
     """The colour that a rule of the style gives, or None."""
-    rule = re.search(rf"^{re.escape(selector)} {{(.*?)}}", STYLE, re.DOTALL | re.MULTILINE)
+    style = re.sub(r"var\((--studio-(?:color-\d+|slack))\)", lambda one: PALETTE[one[1]], STYLE)
+    rule = re.search(rf"^{re.escape(selector)} {{(.*?)}}", style, re.DOTALL | re.MULTILINE)
     found = rule and re.search(rf"{what}: (#\w{{6}})", rule[1])
     return found and found[1]
 
