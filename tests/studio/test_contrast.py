@@ -25,8 +25,8 @@ def contrast(one, other):
 def said(selector, what):
     """The colour that a rule of the style gives, or None."""
     style = re.sub(r"var\((--studio-(?:color-\d+|slack))\)", lambda one: PALETTE[one[1]], STYLE)
-    rule = re.search(rf"^{re.escape(selector)} {{(.*?)}}", style, re.DOTALL | re.MULTILINE)
-    found = rule and re.search(rf"{what}: (#\w{{6}})", rule[1])
+    rules = re.findall(rf"^{re.escape(selector)} {{(.*?)}}", style, re.DOTALL | re.MULTILINE)
+    found = re.search(rf"{what}: (#\w{{6}})", " ".join(rules))
     return found and found[1]
 
 
