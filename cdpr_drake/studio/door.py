@@ -46,6 +46,8 @@ TOKEN_WORDS = f"{SHORTEST_TOKEN} to 200 of the characters A-Z a-z 0-9 . _ ~ -"
 
 IS_TOKEN = re.compile(rf"[A-Za-z0-9._~-]{{{SHORTEST_TOKEN},200}}")
 
+PRINTED = "open the address that cdpr studio has printed when it started."
+NO_COOKIE = "A cookie is missing: open the first page of the studio, with cookies allowed."
 NO_STORE = {"cache-control": "no-store"}
 
 _PLACE = re.compile(
@@ -100,8 +102,8 @@ class Door:
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
-            words = f"{refused or self._why_none()}\n"
-            await PlainTextResponse(words, 403, NO_STORE)(scope, receive, send)
+            none = f"A token is missing: {PRINTED}" if self._token else NO_COOKIE
+            await PlainTextResponse(f"{refused or none}\n", 403, NO_STORE)(scope, receive, send)
 
     def _session(self, request: HTTPConnection) -> str:
         """The session of a request; empty: it has no cookie of this server."""
@@ -122,11 +124,8 @@ class Door:
             return f"Origin: found {', '.join(origins)[:80]!r}; accepted: pages of the studio"
         tokens = request.query_params.getlist(TOKEN) if self._token else []
         right = self._token.encode()
-        if not all(hmac.compare_digest(token.encode(), right) for token in tokens):
-            return (
-                "The token is wrong: open the address that cdpr studio has printed when it started."
-            )
-        return ""
+        fits = all(hmac.compare_digest(token.encode(), right) for token in tokens)
+        return "" if fits else f"The token is wrong: {PRINTED}"
 
     def knows(self, name: str) -> bool:
         """Whether a name means this machine, and can mean no other one tomorrow."""
@@ -149,13 +148,6 @@ class Door:
         if self._token:
             return TOKEN in request.query_params
         return not session and request.scope["path"] == "/" and ASKED not in request.query_params
-
-    def _why_none(self) -> str:
-        if self._token:
-            return (
-                "A token is missing: open the address that cdpr studio has printed when it started."
-            )
-        return "A cookie is missing: open the first page of the studio, with cookies allowed."
 
     def _cookie_page(self, request: HTTPConnection, session: str) -> HTMLResponse:
         """A page that goes on by itself to the address without the token, with a cookie.
