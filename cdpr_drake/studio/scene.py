@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -46,15 +45,6 @@ Solid = tuple[Array, np.ndarray]
 
 POINT_SIZE = 0.011
 """Radius of a point, of the diagonal of the frame."""
-
-FIELD_OF_VIEW = 75.0
-"""Of Meshcat's camera, from the top to the bottom [deg]."""
-
-ASPECT, FILLED = 0.75, 0.94
-"""Width of the narrowest scene of a page, by its height, and how much of it a robot fills."""
-
-VIEW = np.array([-0.18, -0.8, 0.3])
-"""From the robot to the eye: from the front and above, past pillars."""
 
 BACKGROUNDS = {
     False: ([0.92, 0.94, 0.97], [0.98, 0.98, 0.98]),
@@ -112,8 +102,6 @@ class RobotScene:
             self._picture = RobotPicture(
                 robot, full_scale, meshcat=self.meshcat, colors=colors, look=look
             )
-            if look:
-                self.meshcat.SetCameraPose(*fitted_view(robot))
             self.set_dark(self._dark)
             self._points = (0, 0.0)
         self._solids = solids
@@ -161,22 +149,6 @@ class RobotScene:
     def redraw(self) -> None:
         """The next `show` draws everything anew, as after others have drawn into the scene."""
         self._robot, self._solids, self._workspace = None, "", None
-
-
-def fitted_view(robot: Robot) -> tuple[Array, Array]:
-    """Eye and target in W, shape (3,) each [m], from where a robot's frame and points fill the
-    scene."""
-    corners = [*product(*zip(robot.frame.lower, robot.frame.upper, strict=True))]
-    points = np.array([*corners, *robot.cable_set().p_WA.T])
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    back = VIEW / np.linalg.norm(VIEW)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    up = np.cross(back, right)
-    height = FILLED * np.tan(np.radians(FIELD_OF_VIEW) / 2.0)  # of what is seen, at a distance of 1
-    off = points - middle
-    aside = np.maximum(np.abs(off @ right) / (height * ASPECT), np.abs(off @ up) / height)
-    return middle + np.max(off @ back + aside) * back, middle
 
 
 def _solids(robot: Robot) -> str:

@@ -1,6 +1,5 @@
 """Documents, folder and poses of a workbench, without a page."""
 
-import itertools
 import json
 
 import numpy as np
@@ -10,7 +9,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
 from cdpr_drake.studio.pose_answer import RobotQuestions, axis_values, pose_at, pose_axes
-from cdpr_drake.studio.scene import ASPECT, EXITS, FIELD_OF_VIEW, fitted_view
+from cdpr_drake.studio.scene import EXITS
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
@@ -104,21 +103,6 @@ def test_the_scene_follows_the_robot(bench):
     bench.open("planar")
     assert has(f"{EXITS}/2")
     assert not has(f"{EXITS}/7")
-
-
-@pytest.mark.parametrize("name", ["acrobot_large", "planar", "caroca"])
-def test_a_robot_that_is_opened_fills_the_narrowest_scene(name):
-    robot = load_robot(name)
-    eye, middle = fitted_view(robot)
-    back = (eye - middle) / np.linalg.norm(eye - middle)
-    right = np.array([-back[1], back[0], 0.0]) / np.hypot(*back[:2])
-    points = [*itertools.product(*zip(robot.frame.lower, robot.frame.upper, strict=True))]
-    off = eye - np.array(points)
-    half = np.tan(np.radians(FIELD_OF_VIEW / 2.0)) * (off @ back)  # height of the picture there
-    share = np.maximum(
-        np.abs(off @ right) / (ASPECT * half), np.abs(off @ np.cross(back, right)) / half
-    )
-    assert 0.8 < np.max(share) < 1.0
 
 
 def test_points_are_dragged(bench):
