@@ -265,13 +265,15 @@ class RunPanel:
             self._names = names
             self._run.set_options(names, value=board.shown or None)
         self._offer_others(choices)
-        if board.shown != self._key:
+        chosen = choices.get(board.shown)
+        job = None if chosen is None else chosen.job
+        if board.shown != self._key or job is not self._watch.job:  # one after another in a folder
             self._key = board.shown
             self._run.value = board.shown or None
-            self._watch.show(choices.get(board.shown))
+            self._watch.show(chosen)
         self._bar.refresh()
         self._empty.set_visibility(not board.shown)
-        entry, job = self._watch.entry, self._watch.job
+        entry = self._watch.entry
         self._download.set_visibility(entry is not None and entry.folder.is_dir())
         failed = job is not None and job.state == JobState.FAILED
         self._recover.set_visibility(failed and entry is not None and _left_log(entry.folder))

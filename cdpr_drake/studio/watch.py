@@ -74,7 +74,7 @@ class SceneOfRuns:
         """For the scene of a workbench, which is not touched yet."""
         self._bench = ref(bench)  # the workbench keeps this object
         self._scene: RunScene | None = None
-        self._folder: Path | None = None
+        self._shown: tuple[Path, RunJob | None] | None = None
         self._busy, self._drawn, self.was_missed = False, 0.0, False
         self._next: tuple[RunEntry, Sample, float] | None = None
 
@@ -91,11 +91,12 @@ class SceneOfRuns:
             bench.draw(lambda scene: self._work(scene, entry, sample, dark), self._done)
 
     def _work(self, scene: RobotScene, entry: RunEntry, sample: Sample, dark: bool) -> None:
-        if self._scene is None or self._folder != entry.folder:
+        if self._scene is None or self._shown != (entry.folder, entry.job):
             scenario = entry.scenario()
             if scenario is None:
                 return
-            self._scene, self._folder = RunScene(scene.meshcat, scenario), entry.folder
+            self._scene = RunScene(scene.meshcat, scenario)
+            self._shown = entry.folder, entry.job
             scene.set_dark(dark)
         self._scene.draw(sample)
 
@@ -112,7 +113,7 @@ class SceneOfRuns:
         """Lets the open robot be shown again."""
         bench = self._bench()
         if self._scene is not None and bench is not None:
-            self._scene = self._folder = None
+            self._scene = self._shown = None
             self.was_missed = True
             bench.draw(lambda scene: scene.redraw())
             bench.draws(None)
