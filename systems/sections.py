@@ -273,9 +273,11 @@ def sections_at(place: str) -> dict[str, type[Section]]:
 
     One that cannot be imported is left out, with a warning; a fault in one of this package raises.
     """
-    classes = {}
-    foreign = {point.name: point.value for point in entry_points(group=GROUP)}
-    for name, target in {**foreign, **SECTIONS}.items():
+    classes, targets = {}, dict(SECTIONS)
+    for point in entry_points(group=GROUP):
+        if targets.setdefault(point.name, point.value) != point.value:
+            _LOG.warning("section %s = %s: left out: the key is taken", point.name, point.value)
+    for name, target in targets.items():
         where, _, key = name.rpartition(".")
         if where != place:
             continue

@@ -146,5 +146,9 @@ def test_a_key_that_is_taken_stays_what_it_is(monkeypatch, caplog):
 
     with caplog.at_level(logging.WARNING):
         sections.with_sections("visual_servo")(Servo)
+    monkeypatch.setattr(sections, "entry_points", entries(stability=f"{__name__}:Counter"))
+    with caplog.at_level(logging.WARNING):
+        assert sections_at("visual_servo")["stability"] is not Counter
+    assert "visual_servo.stability" in caplog.text
     assert Servo.rate == 1.0
     assert "visual_servo.rate: left out: the key is taken" in caplog.text
