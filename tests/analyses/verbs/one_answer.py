@@ -202,7 +202,7 @@ def by_studio(robot, X_WP, pulleys):
     answer = RobotQuestions(robot).at(X_WP)
     told = {answer.status == "feasible", answer.rest is not None}
     words = f"{answer.why_no_tensions} {answer.why_no_rest}"
-    return Answer(told.pop() if len(told) == 1 else None, words, answer.geometry)
+    return Answer(told.pop() if len(told) == 1 else None, words, answer.robot.geometry_words())
 
 
 CALLS = {
