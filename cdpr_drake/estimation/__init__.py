@@ -1,4 +1,4 @@
-"""Pose of the platform from images or lengths; observers of wrenches, sensors, failures.
+"""Pose of the platform from images and lengths, by Kalman filters too; wrenches, sensors, failures.
 
 Errors of a pose are twists in the body frame, X_true = X exp(e), ordered (rotation, translation).
 

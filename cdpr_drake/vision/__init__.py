@@ -1,4 +1,4 @@
-"""What a camera sees through its lens: targets, textures, cables; how images show where they are.
+"""What a camera sees through its lens: targets, textures, cables; poses by images, also of tags.
 
 Pixels are (u right, v down) from the centre of the first pixel; the camera frame C has z forward,
 x right, y down.
