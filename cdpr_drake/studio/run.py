@@ -14,11 +14,11 @@ from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.boards import RunBoard, RunEntry
 from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
+from cdpr_drake.studio.run_board import RunBoard, RunEntry
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch, SceneOfRuns, SteeringBar

@@ -15,13 +15,13 @@ import numpy as np
 from nicegui import run, ui
 
 from cdpr_drake.analyses.runs.steering import BREAK, PUSH
-from cdpr_drake.studio.boards import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.plots import MovingPlots, charts_of, plot_row
 from cdpr_drake.studio.results import subject_of
+from cdpr_drake.studio.run_board import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.scene import RobotScene, RunScene
 from cdpr_drake.studio.session import Workbench

@@ -10,8 +10,9 @@ import pytest
 
 from cdpr_drake.analyses.runs.steering import Message
 from cdpr_drake.cli.command_forms import command_forms
-from cdpr_drake.studio.boards import CommandBoard, RunBoard
+from cdpr_drake.studio.boards import CommandBoard
 from cdpr_drake.studio.jobs import Job, JobError, JobManager, JobState, progress_of
+from cdpr_drake.studio.run_board import RunBoard
 from cdpr_drake.studio.run_job import MOST_EVENTS, RunJob, Samples
 from tests.studio.conftest import RUN_SETTINGS
 from tests.studio.pages import until
