@@ -219,8 +219,9 @@ OutFolder: TypeAlias = Annotated[
 ]
 Formats: TypeAlias = Annotated[
     Sequence[str],
-    words(formats, "png, pdf, svg, or several with commas", "FORMAT,...", name="--figure-format"),
-]
+    words(formats, "png, pdf, svg, or several with commas", "FORMAT,...", name="--figure-format",
+          completer=lambda _: list(FORMATS)),
+]  # fmt: skip
 Workers: TypeAlias = Annotated[
     int | str | None,
     words(workers, f"1 to {MOST_PROCESSES} processes, or a Dask scheduler, tcp://host:port or its "

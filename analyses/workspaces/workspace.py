@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -36,6 +36,7 @@ from cdpr_drake.analyses.frame.words import (
 )
 from cdpr_drake.analyses.reporting.provenance import code_version
 from cdpr_drake.analyses.reporting.written_files import whole_file
+from cdpr_drake.analyses.runs.breaks import SAVING
 from cdpr_drake.analyses.workspaces.conditions import (
     KINDS,
     MEASURES,
@@ -83,13 +84,15 @@ def corners(word: str) -> Array:
     return np.array([numbers(3)(corner) for corner in word.split(";")])
 
 
-def _names(name: str | None, metavar: str) -> Parameter:
-    return words(names, "names with commas", f"{metavar},...", name=name)
+def _names(known: Collection[str], name: str | None, metavar: str) -> Parameter:
+    return words(
+        names, "names with commas", f"{metavar},...", name=name, completer=lambda _: list(known)
+    )
 
 
-Kinds: TypeAlias = Annotated[str | Sequence[str], _names("--kind", "KIND")]
-Measures: TypeAlias = Annotated[str | Sequence[str], _names("--measure", "MEASURE")]
-Reactions: TypeAlias = Annotated[Sequence[str] | None, _names(None, "REACTION")]
+Kinds: TypeAlias = Annotated[str | Sequence[str], _names(KINDS, "--kind", "KIND")]
+Measures: TypeAlias = Annotated[str | Sequence[str], _names(MEASURES, "--measure", "MEASURE")]
+Reactions: TypeAlias = Annotated[Sequence[str] | None, _names(SAVING, None, "REACTION")]
 WrenchSet: TypeAlias = Annotated[
     Path | str | SpatialSet | None, words(Path, "a file", "FILE", name="--wrench-set")
 ]

@@ -124,9 +124,14 @@ def _converted(kind: Any, tokens: Any) -> Any:
     return int(tokens[-1].value) if kinds[0] is int else convert(kind, tokens)
 
 
-def shown_arguments(name: str) -> list[Argument]:
-    """Arguments and options that the help of a subcommand shows, with their words."""
-    arguments = make_app([name])[name].assemble_argument_collection(
+def shown_arguments(name: str, *form: str) -> list[Argument]:
+    """Arguments and options that the help of a subcommand shows, with their words.
+
+    Args:
+        name: The subcommand.
+        form: The option of one of its forms, such as --free.
+    """
+    arguments = make_app([name, *form])[name].assemble_argument_collection(
         default_parameter=_usual_parameter(), parse_docstring=True
     )
     return [argument for argument in arguments if argument.show]

@@ -6,7 +6,7 @@ import atexit
 import os
 import sys
 import webbrowser
-from collections.abc import Mapping
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -16,10 +16,15 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from cdpr_drake.analyses.frame.words import OpenedWord, whole
+from cdpr_drake.cli.call import parsed, shown_arguments
+from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.errors import CdprError, install_words
 
 if TYPE_CHECKING:
-    from cdpr_drake.studio.workbench.command_form import CommandForm
+    from cdpr_drake.studio.verb_form import Verb
+
+NOT_OFFERED = ("studio", "serve", "view")
+"""Commands that the page does not start: itself, and those that wait for others."""
 
 TOKEN_VARIABLE = "CDPR_STUDIO_TOKEN"
 """Of the environment: a token that is the same at each start."""
@@ -55,14 +60,23 @@ def studio(
     print("cdpr studio: starting, Drake and the page are loaded", file=sys.stderr, flush=True)
     from cdpr_drake.studio.server import serve
 
-    def commands() -> Mapping[str, CommandForm]:
-        """Forms, which import most of the package: not before the page is there."""
-        from cdpr_drake.cli.command_forms import command_forms
-
-        return command_forms()
-
     ready = _open_browser if browser else lambda address: None
-    serve(opened, folder=folder, host=host, port=port, token=token, ready=ready, commands=commands)
+    serve(opened, folder=folder, host=host, port=port, token=token, ready=ready, commands=verbs)
+
+
+def verbs() -> dict[str, Verb]:
+    """The verbs that the page offers, by the words of their commands; imports none of them."""
+    from cdpr_drake.studio.verb_form import Verb
+
+    lines = {name: command.line for name, command in COMMANDS.items()}
+    lines |= {
+        f"{name} --{form}": line
+        for name, command in COMMANDS.items() for form, (_, line) in command.forms.items()
+    }  # fmt: skip
+    return {
+        words: Verb(words, line, partial(shown_arguments, *words.split()), parsed)
+        for words, line in lines.items() if words not in NOT_OFFERED
+    }  # fmt: skip
 
 
 def _wanted_token(no_token: bool) -> str | None:

@@ -12,12 +12,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from cdpr_drake.models.robot_loader import robot_names
+from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
-from cdpr_drake.studio.run_job import RunJob
-from cdpr_drake.studio.workbench.command_form import CommandForm
-from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.studio.verb_form import Verb
+from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+
+RESULTS = ("results.json", "summary.json")
+"""Files that have a command's numbers; the first that is there."""
 
 MOST_FOLDERS = 200
 """Results folders that are offered, the newest ones."""
@@ -26,15 +28,11 @@ LOOK_PERIOD = 0.4
 """Between two looks at the folders [s]."""
 
 ASKED = ".asked.json"
-"""Ending of the file beside a results folder that says how it was asked for, so that it can go on
-when the server was started anew; gone when the work is done."""
-
-ABOUT = ".about.json"
-"""Ending of the file beside a results folder that says which robot it is about, as it was then."""
+"""Ending of the file beside a results folder that says by which words it was asked for, so that it
+can go on when the server was started anew, and which robot it is about, as it was then."""
 
 LARGEST_FILE = 100_000
 """Of such a file that is read [bytes]."""
-
 
 J = TypeVar("J", bound=Job)
 
@@ -47,10 +45,9 @@ class Entry(Generic[J]):
         folder: The results folder.
         name: What people see.
         job: The newest job that works in the folder, as long as the server has it.
-        asked: Arguments by which it goes on, without --out and --json; empty: nobody knows them,
-            or it is done.
+        asked: Words by which it goes on; empty: nobody knows them, or it is done.
         about: Name and digest of the robot that it is about; empty: not known.
-        is_whole: Whether all results are there.
+        is_whole: True if all results are there.
     """
 
     folder: Path
@@ -60,41 +57,75 @@ class Entry(Generic[J]):
     about: Mapping[str, str] = field(default_factory=dict)
     is_whole: bool = False
 
-    def scenario(self) -> Any | None:
-        """The scenario of a run; None: it is not known any more.
+    def digest(self, robot: str) -> str:
+        """Digest of the robot of a name, as it was when this was asked for; empty: not known."""
+        return self.about.get("digest", "") if self.about.get("robot") == robot else ""
 
-        Raises:
-            CdprError: It is not accepted any more.
+
+class VerbJob(Job):
+    """A command whose answer becomes the numbers of its folder, where it writes none itself."""
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        working: Path,
+        folder: Path,
+        asked: Path,
+        about: Mapping[str, str],
+    ) -> None:
+        """Of a command line; the file `asked` says by which words it can go on, until it is done.
+
+        `about` is name and digest of the robot that it is about.
         """
-        file = self.folder / "scenario.yaml"
-        if file.is_file():
-            return load_scenario(file)
-        if isinstance(self.job, RunJob):
-            return load_scenario(self.job.scenario, self.job.settings)
-        return None
+        super().__init__(folder.name, words, working, folder)
+        self._asked, self._about = asked, about
+
+    async def _work(self) -> None:
+        await super()._work()
+        await asyncio.to_thread(self._put_away)
+
+    def _put_away(self) -> None:
+        data, folder = self.result(), self.folder
+        assert folder is not None
+        with suppress(OSError):  # a full disk, say: the page shows what there is
+            if self.state == JobState.FINISHED:
+                if data is not None and not has_numbers(folder):
+                    rows = data if isinstance(data, dict) else {self.arguments[0]: data}
+                    folder.mkdir(parents=True, exist_ok=True)
+                    (folder / RESULTS[0]).write_text(json.dumps(rows, indent=2), encoding="utf-8")
+                write_asked(self._asked, (), self._about)
+            elif not folder.is_dir():
+                self._asked.unlink(missing_ok=True)
 
 
-CommandEntry = Entry[Job]
+def write_asked(path: Path, words: Sequence[str], about: Mapping[str, str]) -> None:
+    """Writes by which words a folder beside can go on, none if it is done, and on which robot."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"words": list(words), **about}), encoding="utf-8")
+
+
+def has_numbers(folder: Path) -> bool:
+    """True if a command has finished in a folder."""
+    return any((folder / name).is_file() for name in RESULTS)
 
 
 class Board(Generic[J]):
-    """Results below one folder, each with the job that works there.
+    """Results below one folder of the working folder, each with the job that works there.
 
     Attributes:
-        name: Of the folder that all results are below.
+        name: Of that folder.
         shown: Key of what is looked at, of `choices`, the name of its folder; empty: nothing.
     """
 
     def __init__(
         self, jobs: JobManager, root: Path, name: str, kind: type[J],
-        is_whole: Callable[[Path], bool],
+        is_whole: Callable[[Path], bool] = has_numbers,
     ) -> None:  # fmt: skip
-        """With the server's jobs of a kind and the working folder; `is_whole` says whether all
-        results are in a folder."""
+        """With the server's jobs of a kind; `is_whole` tells if all results are in a folder."""
         self._jobs, self._root, self.name = jobs, root, name
         self._kind, self._is_whole = kind, is_whole
         self.shown = ""
-        self._left: dict[Path, Entry[J]] = {}
+        self._left: dict[str, Entry[J]] = {}
         self._looks, self._looked = False, -LOOK_PERIOD
 
     @property
@@ -115,39 +146,31 @@ class Board(Generic[J]):
             if not self._looks and time.monotonic() - self._looked > LOOK_PERIOD:
                 self._looks = True
                 loop.run_in_executor(None, self._look)
-        found: dict[str, Entry[J]] = {}
+        entries: dict[str, Entry[J]] = {}
         for job in reversed(self._jobs.jobs):
             folder = job.folder
             if isinstance(job, self._kind) and folder and folder.parent == self.folder:
-                there = self._left.get(folder) or Entry(folder)
-                goes_on = job.state in (JobState.FAILED, JobState.STOPPED)
-                entry = replace(
-                    there, name=f"{folder.name}, {job.state.value}", job=job,
-                    asked=there.asked if goes_on else (),
-                )  # fmt: skip
-                found.setdefault(folder.name, entry)
-        for folder, there in self._left.items():
-            found.setdefault(folder.name, there)
-        return found
+                there = self._left.get(folder.name) or Entry(folder)
+                asked = there.asked if job.state in (JobState.FAILED, JobState.STOPPED) else ()
+                name = f"{folder.name}, {job.state.value}"
+                entries.setdefault(folder.name, replace(there, name=name, job=job, asked=asked))
+        return entries | {key: one for key, one in self._left.items() if key not in entries}
+
+    def shown_entry(self) -> Entry[J] | None:
+        """What is looked at; the newest if that is gone; None: there is nothing."""
+        choices = self.choices()
+        if self.shown not in choices:
+            self.shown = next(iter(choices), "")
+        return choices.get(self.shown)
 
     def _look(self) -> None:
         """Reads what there is in the folders."""
         try:
-            self._left = {folder: self._read(folder) for folder in self._results()}
+            self._left = {folder.name: self._read(folder) for folder in self._results()}
         except OSError:
             self._left = {}
         finally:
             self._looks, self._looked = False, time.monotonic()
-
-    def _read(self, folder: Path) -> Entry[J]:
-        words, about = (_told(self._beside(folder, ending)) for ending in (ASKED, ABOUT))
-        fits = isinstance(words, list) and all(isinstance(word, str) for word in words)
-        asked = tuple(words) if fits and self._may_run(words) else ()
-        fits = isinstance(about, dict) and all(isinstance(each, str) for each in about.values())
-        return Entry(
-            folder, f"{folder.name}, stopped" if asked else folder.name, asked=asked,
-            about=about if fits else {}, is_whole=self._is_whole(folder),
-        )  # fmt: skip
 
     def _results(self) -> list[Path]:
         """Folders with results, whole or not, the newest first; none that a link leads to."""
@@ -156,93 +179,76 @@ class Board(Generic[J]):
         some = [
             path for path in self.folder.iterdir()
             if not path.is_symlink() and not path.name.startswith(".") and path.is_dir()
-            and (self._is_whole(path) or self._beside(path, ASKED).is_file())
+            and (self._is_whole(path) or self._beside(path).is_file())
         ]  # fmt: skip
         return sorted(some, key=lambda path: -path.stat().st_mtime)[:MOST_FOLDERS]
 
-    def _beside(self, folder: Path, ending: str) -> Path:
-        return self.folder / f".{folder.name}{ending}"
+    def _read(self, folder: Path) -> Entry[J]:
+        asked = _asked(self._beside(folder))
+        words = tuple(map(str, asked.pop("words", ())))
+        about = {key: str(value) for key, value in asked.items()}
+        name = f"{folder.name}, stopped" if words else folder.name
+        return Entry(folder, name, asked=words, about=about, is_whole=self._is_whole(folder))
 
-    def _may_run(self, words: Sequence[str]) -> bool:
-        """Whether arguments from a file are such as a page would make."""
-        return False
+    def _beside(self, folder: Path) -> Path:
+        return self.folder / f".{folder.name}{ASKED}"
 
 
-class CommandBoard(Board[Job]):
-    """Commands of one kind, which go on in the folder where they were stopped."""
-
-    def __init__(
-        self,
-        jobs: JobManager,
-        root: Path,
-        name: str,
-        forms: Mapping[str, CommandForm],
-        *,
-        is_whole: Callable[[Path], bool] = lambda folder: (folder / "results.json").is_file(),
-    ) -> None:
-        """As the base class; what a file asks for beyond the `forms` of commands is not run."""
-        super().__init__(jobs, root, name, Job, is_whole)
-        self._forms = forms
+class VerbBoard(Board[VerbJob]):
+    """Commands and their results below one folder."""
 
     def start(
-        self, name: str, arguments: Sequence[str], about: Mapping[str, str] | None = None
-    ) -> Job:
-        """Begins a command with results in a new folder of that name, and looks at it.
+        self, verb: Verb, words: Sequence[str], name: str,
+        about: Mapping[str, str],
+    ) -> VerbJob:  # fmt: skip
+        """Begins a verb with results in a new folder of a name, and looks at it.
 
-        `arguments` are without --out and --json; `about` is name and digest of its robot.
+        `words` are those of its form, `about` is name and digest of its robot, if it has one.
         """
         folder = self._jobs.free_folder(self.folder / name)
         with suppress(OSError):  # a full disk, say: the command will tell
-            self.folder.mkdir(parents=True, exist_ok=True)
-            self._beside(folder, ASKED).write_text(json.dumps(list(arguments)), encoding="utf-8")
-            if about is not None:
-                self._beside(folder, ABOUT).write_text(json.dumps(dict(about)), encoding="utf-8")
-        return self._submit(folder, arguments)
+            write_asked(self._beside(folder), words, about)
+        return self._submit(folder, verb, words, about)
 
-    def go_on(self, computed: CommandEntry) -> Job | None:
-        """Begins a command anew where it was stopped; None: it works, or nobody knows how it was
-        asked for."""
-        if not computed.asked or (computed.job is not None and not computed.job.state.is_over):
-            return None
-        return self._submit(computed.folder, computed.asked)
+    def go_on(
+        self, entry: Entry[VerbJob], verbs: Mapping[str, Verb],
+        folder: WorkingFolder,
+    ) -> VerbJob:  # fmt: skip
+        """Begins a command anew where it was stopped.
 
-    def _submit(self, folder: Path, arguments: Sequence[str]) -> Job:
-        job = Job(
-            folder.name, [*arguments, f"--out={folder}", "--json"], self._root, folder,
-            done_with=self._beside(folder, ASKED),
-        )  # fmt: skip
-        self._jobs.submit(job)
+        Raises:
+            CdprError: Its words, which a file has, are not such as a form of the page makes.
+        """
+        verb = verbs.get(entry.asked[0]) if entry.asked else None
+        if verb is None or (entry.job is not None and not entry.job.state.is_over):
+            raise CdprError(f"{entry.folder.name}: nobody knows how it was asked for, or it works")
+        verb.accept(entry.asked, folder)
+        return self._submit(entry.folder, verb, entry.asked, entry.about)
+
+    def _submit(
+        self, folder: Path, verb: Verb, words: Sequence[str],
+        about: Mapping[str, str],
+    ) -> VerbJob:  # fmt: skip
+        out = [f"--out={folder}"] if verb.writes_folder else []
+        line = [words[0], *out, "--json", *words[1:]]
         self.shown = folder.name
-        return job
-
-    def _may_run(self, words: Sequence[str]) -> bool:
-        form = self._forms.get(words[0]) if words else None
-        if form is None or len(words) < 2 or words[1].startswith("-"):
-            return False
-        known = words[0] == "study" or words[1] in robot_names() or self._is_inside(words[1])
-        return known and form.allows(words[2:], self._is_inside)
-
-    def _is_inside(self, name: str) -> bool:
-        """Whether a path leads to something in the working folder, also by links."""
-        try:
-            return (self._root / name).resolve().is_relative_to(self._root.resolve())
-        except (OSError, RuntimeError, ValueError):
-            return False
+        return self._jobs.submit(VerbJob(line, self._root, folder, self._beside(folder), about))
 
 
-def _told(path: Path) -> Any:
-    """What a file of JSON beside a folder says; None: nothing that can be read."""
-    try:
+def _asked(path: Path) -> dict[str, Any]:
+    """What a file beside a folder says; empty: nothing that can be read."""
+    with suppress(OSError):
         state = path.lstat()
-    except OSError:
-        return None
-    return _read(path, state.st_mtime_ns, state.st_size)
+        return dict(_read(path, state.st_mtime_ns, state.st_size))
+    return {}
 
 
 @lru_cache(maxsize=4 * MOST_FOLDERS)
-def _read(path: Path, changed: int, size: int) -> Any:
+def _read(path: Path, changed: int, size: int) -> dict[str, Any]:
     """What a file says that was changed last then, and has that size."""
     with suppress(OSError, ValueError):
         if path.is_file() and not path.is_symlink() and size <= LARGEST_FILE:
-            return load_json(path.read_text(encoding="utf-8"))
-    return None
+            data = load_json(path.read_text(encoding="utf-8"))
+            if isinstance(data, dict) and isinstance(data.get("words"), list):
+                return data
+    return {}

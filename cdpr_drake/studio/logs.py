@@ -16,29 +16,26 @@ import pandas as pd
 from nicegui import run, ui
 
 from cdpr_drake.analyses.logs.columns import LENGTH, PARTS, POSITION, SECONDS, TENSION
-from cdpr_drake.analyses.logs.dialects import AUTO, DIALECTS, LOG_SUFFIXES
+from cdpr_drake.analyses.logs.dialects import LOG_SUFFIXES
 from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.analyses.logs.replay import SUMMARY, TABLE
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.boards import CommandBoard
-from cdpr_drake.studio.panel import LOG, robot_argument, show_errors
-from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
+from cdpr_drake.studio.panel import LOG, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
-from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.views import CommandResults, View, place_image, show_results
+from cdpr_drake.studio.verb_panel import TICK, VerbPanel, VerbTab
+from cdpr_drake.studio.views import View, place_image
 from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 
-RESULTS = "logs"
-"""Folder of comparisons in the working folder."""
-
-TICK = 0.5
-"""Time between looks at jobs and folders [s]."""
-
-FIRST = ("follow", "fit-frame", "unit", "log-format")
-"""Options that are always shown."""
+TAB = VerbTab(
+    folder="logs", result=LOG, verbs=("replay",), start="Compare",
+    first={"replay": ("follow", "fit-frame", "unit", "log-format")},
+    empty="No comparison yet. Put a log of a machine or tracker into the working folder, or "
+    "simulate a run in the tab Run, and choose it above: its channels, rates and gaps are listed. "
+    "Compare puts it beside the model of the open robot.",
+)  # fmt: skip
 
 MOST_ROWS = 1500
 """Rows of a comparison that are drawn, evenly spread."""
@@ -46,118 +43,66 @@ MOST_ROWS = 1500
 DOTS = 110
 """Of the picture of a log [1/inch]."""
 
-EMPTY = (
-    "No log is open. Put a log of a machine or tracker into the working folder, or simulate a run "
-    "in the tab Run, and choose it above: its channels, rates and gaps are listed here. Compare "
-    "puts it beside the model of the open robot."
-)
-
-
-class LogView:
-    """What a session sees of logs, in all its tabs.
-
-    Attributes:
-        board: Comparisons.
-        filled: What was filled into the form.
-        log: Name of the log that is open, in the working folder; empty: none.
-    """
-
-    def __init__(self, bench: Workbench) -> None:
-        """For a workbench."""
-        # A comparison is done or not: it cannot go on, so nothing is run that a file asks for.
-        self.board = CommandBoard(
-            bench.jobs, bench.folder.root, RESULTS, {}, is_whole=is_comparison
-        )
-        self.filled, self.log = Filled(), ""
-
-
-_views: WeakKeyDictionary[Workbench, LogView] = WeakKeyDictionary()
-"""What each session sees, as long as it has a workbench."""
+_logs: WeakKeyDictionary[Workbench, str] = WeakKeyDictionary()
+"""Name of the log that each session looks at, in its working folder."""
 
 
 def logs_panel(bench: Workbench) -> None:
     """Places the logs panel."""
-    _LogsPanel(bench, _views.setdefault(bench, LogView(bench)))
+    files = log_files(bench.folder)
+    chosen = ui.select(files, label="log in the working folder", with_input=True)
+    chosen.props("dense outlined").classes("w-full").mark("log")
+    contents = ui.element("div").classes("w-full").mark("log-contents")
 
+    def given() -> dict[str, str]:
+        return {"log": str(bench.folder.path(_logs[bench])) if bench in _logs else ""}
 
-class _LogsPanel:
-    """The panel in one tab of a browser."""
+    panel = VerbPanel(bench, TAB, given=given, show=_show)
 
-    def __init__(self, bench: Workbench, view: LogView) -> None:
-        self._bench, self._view, self._robot = bench, view, ""
-        with ui.row().classes("w-full items-center no-wrap"):
-            files = log_files(bench.folder)
-            self._log = ui.select(files, label="log in the working folder", with_input=True)
-            self._log.props("dense outlined").classes("col").mark("log")
-            self._log.on_value_change(self._choose)
-            self._start_button = ui.button("Compare", icon="compare_arrows", on_click=self._start)
-            self._start_button.props("no-caps").mark("compare-log")
-        self._empty = ui.label(EMPTY).classes("studio-empty").mark("logs-empty")
-        self._contents = ui.element("div").classes("w-full").mark("log-contents")
-        fields = CommandFields(
-            bench.commands["replay"], view.filled, FIRST,
-            {"log-format": Choices([*DIALECTS, AUTO])}, bench.folder,
-        )  # fmt: skip
-        self._results = CommandResults(view.board, fields, "comparisons", self._show)
-        self._say_empty()
-        self._log.value = view.log or None
-        ui.timer(TICK, self._tick)
-
-    def _say_empty(self) -> None:
-        self._empty.set_visibility(not self._view.log)
-        self._start_button.set_enabled(bool(self._view.log))
-
-    async def _choose(self) -> None:
-        name = self._view.log = str(self._log.value or "")
-        self._contents.clear()
-        self._say_empty()
+    async def choose() -> None:
+        name = _logs[bench] = str(chosen.value or "")
+        contents.clear()
+        panel.start.set_enabled(bool(name))
         if not name:
             return
-        with self._contents, show_errors():
+        with contents, show_errors():
             sign = ui.spinner(size="lg")
             try:
-                read = await run.io_bound(log_contents, self._bench.folder.path(name))
+                read = await run.io_bound(log_contents, bench.folder.path(name))
             finally:
                 if not sign.is_deleted:  # another log was chosen meanwhile
                     sign.delete()
-            if read is not None and name == self._view.log:
-                contents, picture = read
+            if read is not None and name == _logs[bench]:
+                view, picture = read
                 with ui.expansion("What is in the log", value=True).classes("w-full studio-group"):
-                    contents.place(unfolded=True)
+                    view.place(unfolded=True)
                     place_image(picture, Path("columns of the log over time.png"))
 
-    def _start(self) -> None:
-        with show_errors():
-            path, now = self._bench.folder.path(self._view.log), self._bench.subject
-            words = ["replay", str(path), f"--robot={robot_argument(self._bench)}"]
-            name = f"{path.parent.name if path.stem == 'log' else path.stem}-{now.robot}"
-            self._results.start(name, words, {"robot": now.robot, "digest": now.digest})
+    async def follow() -> None:
+        files = await run.io_bound(log_files, bench.folder)
+        if files is not None and files != chosen.options:
+            chosen.set_options(files, value=_logs.get(bench) or None)
 
-    async def _tick(self) -> None:
-        with show_errors():
-            files = log_files(self._bench.folder)
-            if files != self._log.options:
-                self._log.set_options(files, value=self._view.log or None)
-            entry = await self._results.tick()
-            digest = "" if entry is None else entry.about.get("digest", "")
-            subject = Subject(self._robot, digest) if entry is not None and self._robot else None
-            self._bench.results.show(LOG, subject)
+    panel.start.set_enabled(False)
+    chosen.on_value_change(choose)
+    chosen.value = _logs.get(bench) or None
+    ui.timer(TICK, follow)
 
-    async def _show(self, folder: Path) -> None:
-        self._robot = ""
-        with show_errors():
-            comparison = await run.io_bound(read_comparison, folder)
-            if comparison is None:  # the server is ending
-                return
-            self._robot, charts, end, rows = comparison
+
+async def _show(view: View) -> None:
+    """Places a comparison as curves, then all else that there is of it."""
+    assert view.folder is not None
+    with show_errors():
+        comparison = await run.io_bound(read_comparison, view.folder)
+        if comparison is not None:  # the server is not ending
             with ui.element("div").classes("w-full cdpr-run").mark("comparison"):
-                plots = MovingPlots(lambda: plots.begin(charts, end, rows))
-        await show_results(folder)
+                plots = MovingPlots(lambda: plots.begin(*comparison))
+    view.place()
 
 
 def log_files(folder: WorkingFolder) -> list[str]:
     """Files of a working folder that may be logs, then the logs of its runs."""
-    files = [name for name in folder.files(LOG_SUFFIXES) if not name.startswith(f"{RESULTS}/")]
+    files = [name for name in folder.files(LOG_SUFFIXES) if not name.startswith(f"{TAB.folder}/")]
     runs = sorted(folder.root.glob("runs/*/log.csv"))
     return [*files, *(folder.shown(path) for path in runs)][:MOST_FILES]
 
@@ -175,13 +120,8 @@ def log_contents(path: Path) -> tuple[View, bytes]:
     ), picture.getvalue()
 
 
-def is_comparison(folder: Path) -> bool:
-    """True if a folder has what `cdpr replay` writes."""
-    return all((folder / name).is_file() for name in (SUMMARY, TABLE))
-
-
-def read_comparison(folder: Path) -> tuple[str, list[Chart], float, list[Row]]:
-    """What `cdpr replay` wrote: the robot's name, charts of the log and the model, end [s], rows.
+def read_comparison(folder: Path) -> tuple[list[Chart], float, list[Row]]:
+    """What `cdpr replay` wrote: charts of the log and the model, end [s], rows.
 
     Raises:
         OutputFolderError: There is none, or it cannot be read.
@@ -190,8 +130,7 @@ def read_comparison(folder: Path) -> tuple[str, list[Chart], float, list[Row]]:
         summary = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
         table = pd.read_csv(folder / TABLE)
         rows = np.unique(np.linspace(0, len(table) - 1, min(len(table), MOST_ROWS)).astype(int))
-        curves = _compared(list(summary["cables"]), table.iloc[rows].astype(float))
-        return str(summary["robot"]), *curves
+        return _compared(list(summary["cables"]), table.iloc[rows].astype(float))
     except (OSError, ValueError, KeyError, IndexError) as problem:
         raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
 

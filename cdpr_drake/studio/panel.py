@@ -19,9 +19,11 @@ from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.calculator import Signal
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 
-WORKSPACES, RUN, COMPARED, LOG, STUDY = "workspaces", "run", "compared", "log", "study"
+WORKSPACES, RUN, COMPARED, LOG, STUDY, ANSWER = (
+    "workspaces", "run", "compared", "log", "study", "answer",
+)  # fmt: skip
 """Names of results: computed workspaces, the run that is shown, the one behind it, a log beside the
-model, a study."""
+model, a study, what a command answered."""
 
 LONGEST = 490
 """Characters of a message; longer ones lose their middle."""
@@ -66,6 +68,7 @@ PANELS = {
     ),
     "logs": Panel("Logs", "timeline", "logs:logs_panel", {LOG: "The comparison"}),
     "studies": Panel("Studies", "science", "studies:studies_panel", {STUDY: "Studies"}),
+    "commands": Panel("Commands", "terminal", "commands:commands_panel", {ANSWER: "The answer"}),
 }  # fmt: skip
 """Panels by name, in the order of their tabs."""
 

@@ -29,7 +29,7 @@ from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.sessions import Sessions
-from cdpr_drake.studio.workbench.command_form import CommandForm
+from cdpr_drake.studio.verb_form import Verb
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LONGEST_ABSENCE = 30.0
@@ -47,7 +47,7 @@ def serve(
     port: int = 0,
     token: str | None = None,
     ready: Callable[[str], None] = lambda address: None,
-    commands: Callable[[], Mapping[str, CommandForm]] = dict,
+    commands: Callable[[], Mapping[str, Verb]] = dict,
 ) -> None:
     """Serves the page until it is interrupted; prints its address.
 

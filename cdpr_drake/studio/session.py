@@ -31,7 +31,7 @@ from cdpr_drake.studio.pose_answer import (
     pose_at,
 )
 from cdpr_drake.studio.results import Results, Subject, subject_of
-from cdpr_drake.studio.workbench.command_form import CommandForm
+from cdpr_drake.studio.verb_form import Verb
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -83,7 +83,7 @@ class Workbench:
     def __init__(
         self, folder: WorkingFolder, robot: str = USUAL_ROBOT, scenario: str = "", *,
         calculator: Calculator | None = None, jobs: JobManager | None = None,
-        commands: Callable[[], Mapping[str, CommandForm]] = dict,
+        commands: Callable[[], Mapping[str, Verb]] = dict,
     ) -> None:  # fmt: skip
         """With a robot of the package or the path of a file, and perhaps a scenario.
 
@@ -126,7 +126,7 @@ class Workbench:
         self.robot.changed.connect(self._robot_changed)
 
     @cached_property
-    def commands(self) -> Mapping[str, CommandForm]:
+    def commands(self) -> Mapping[str, Verb]:
         """Forms of the commands that there are, by name."""
         return self._make_commands()
 

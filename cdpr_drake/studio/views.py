@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import base64
 import zipfile
-from collections.abc import Awaitable, Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,16 +23,9 @@ from nicegui import run, ui
 from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.boards import CommandBoard, CommandEntry
-from cdpr_drake.studio.job_bar import JobBar
-from cdpr_drake.studio.jobs import Job, JobState
+from cdpr_drake.studio.boards import RESULTS
 from cdpr_drake.studio.numbers import fact_rows, number_words, plain_table
-from cdpr_drake.studio.panel import notify, show_errors
-from cdpr_drake.studio.panels.command_fields import CommandFields
-from cdpr_drake.studio.workbench.command_form import FieldProblem
-
-RESULTS = ("results.json", "summary.json")
-"""Files that have a command's numbers; the first that is there."""
+from cdpr_drake.studio.panel import show_errors
 
 FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
 """Types of the figures that a page shows, by their endings."""
@@ -69,6 +62,7 @@ class View:
         tables: Headings and rows of words, by title.
         folder: Their folder; None: there is none.
         files: Its files here and one folder below, but hidden ones and links out of the folder.
+        robot: Name of the robot that they are about; empty: they do not say.
     """
 
     facts: list[tuple[str, str]]
@@ -76,6 +70,7 @@ class View:
     tables: dict[str, Words]
     folder: Path | None = None
     files: Mapping[str, Path] = field(default_factory=dict)
+    robot: str = ""
 
     @classmethod
     def of(
@@ -90,7 +85,9 @@ class View:
         rest = {key: value for key, value in data.items() if key not in tables}
         facts = [(name, _words(value)) for name, value in leaves(rest)]
         shown = dict(_table(key, rows, most_rows) for key, rows in tables.items())
-        return cls(facts, statements, shown, folder, {} if folder is None else _files(folder))
+        files = {} if folder is None else _files(folder)
+        robot = data.get("robot")
+        return cls(facts, statements, shown, folder, files, robot if isinstance(robot, str) else "")
 
     @property
     def figures(self) -> dict[str, Path]:
@@ -336,65 +333,6 @@ async def send_file(path: Path) -> None:
         data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
         if data is not None:
             ui.download(data, f"{path.name}.zip" if is_folder else path.name)
-
-
-class CommandResults:
-    """Which results of a command are shown, how far it is, and below that the results themselves.
-
-    Attributes:
-        bar: The results that there are, and the job.
-    """
-
-    def __init__(
-        self, board: CommandBoard, fields: CommandFields, label: str,
-        show: Callable[[Path], Awaitable[object]] = show_results,
-    ) -> None:  # fmt: skip
-        """Places it into the current slot.
-
-        Args:
-            board: What the session looks at.
-            fields: The form of the command, which says what the command refuses.
-            label: Of the list of results.
-            show: Places the results of a folder into the current slot.
-        """
-        self._board, self._fields, self._show = board, fields, show
-        self._job: Job | None = None
-        self._shown: tuple[Path | None, float] = None, 0.0
-        self.bar = JobBar(board, label)
-        self._body = ui.element("div").classes("w-full").mark(f"{board.name}-shown")
-
-    def start(
-        self, name: str, words: Sequence[str], about: Mapping[str, str] | None = None
-    ) -> None:
-        """Begins the command, with the options of its form, if all of them are accepted.
-
-        Args:
-            name: Of the results folder.
-            words: Of the command, before its options.
-            about: Name and digest of the robot that it is about; None: no robot.
-        """
-        with show_errors(), suppress(FieldProblem):  # the field says it
-            self._job = self._board.start(name, [*words, *self._fields.arguments()], about)
-            self.bar.refresh()
-
-    async def tick(self) -> CommandEntry | None:
-        """Follows the job and its folder; returns what is shown."""
-        self.bar.refresh()
-        if self._job is not None and self._job.state.is_over:
-            job, self._job = self._job, None
-            key = self._fields.form.field_of(job.message)
-            if job.state == JobState.FAILED and not (key and self._fields.say(key, job.message)):
-                notify(job.message)
-        entry = self.bar.computed
-        whole = entry if entry is not None and entry.is_whole else None
-        stamp = (None, 0.0) if whole is None else (whole.folder, changed(whole.folder))
-        if stamp != self._shown:
-            self._shown = stamp
-            self._body.clear()
-            if whole is not None:
-                with self._body:
-                    await self._show(whole.folder)
-        return whole
 
 
 def changed(folder: Path) -> float:

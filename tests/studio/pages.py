@@ -6,7 +6,7 @@ from contextlib import asynccontextmanager, contextmanager
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
 
-from cdpr_drake.cli.command_forms import command_forms
+from cdpr_drake.cli.studio import verbs
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
@@ -95,7 +95,7 @@ def _loading(user):
 
 
 def _bench(folder, robot, calculator):
-    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=command_forms)
+    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=verbs)
 
 
 async def until(condition, seconds=300.0):

@@ -7,9 +7,9 @@ import select
 import sys
 
 import pytest
+from cdpr_drake.cli.command_forms import command_forms
 
 from cdpr_drake.analyses.runs.steering import Message
-from cdpr_drake.cli.command_forms import command_forms
 from cdpr_drake.studio.boards import CommandBoard
 from cdpr_drake.studio.jobs import Job, JobError, JobManager, JobState, progress_of
 from cdpr_drake.studio.run_board import RunBoard

@@ -9,7 +9,8 @@ import pytest
 
 from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.logs import _views, log_contents, log_files, read_comparison
+from cdpr_drake.studio.logs import TAB, log_contents, log_files, read_comparison
+from cdpr_drake.studio.verb_panel import view_of
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, open_panel, problems, shown, until
 
@@ -43,8 +44,7 @@ def test_logs_of_the_folder_and_of_runs_have_the_contents_of_the_front_door(work
 
 
 def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
-    robot, charts, end, rows = read_comparison(beside)
-    assert robot == ROBOT
+    charts, end, rows = read_comparison(beside)
     columns = 1 + sum(len(chart.series) for chart in charts)
     assert all(len(row) == columns for row in rows)
     table = np.genfromtxt(beside / "replay.csv", delimiter=",", names=True)
@@ -66,13 +66,13 @@ async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, b
     field(user, "log").value = "wrong.csv"
     await until(lambda: "rows gaps</th><td>1<" in _content(user, "table-Numbers"))
     assert "C8_length_m" in _content(user, "table-columns")
-    user.find(marker="compare-log").click()
+    user.find(marker="start-logs").click()
     await until(lambda: bench.results.subject("log") is not None)
     assert bench.results.subject("log").digest == bench.subject.digest
     await until(lambda: shown(user, "table-cables"))
     offset, right = (
         json.loads((folder / "summary.json").read_text())["cables"]["C1"]["length_offset_m"]
-        for folder in (work / "logs" / _views[bench].board.shown, beside)
+        for folder in (work / "logs" / view_of(bench, TAB).board.shown, beside)
     )
     assert offset - right == pytest.approx(OFFSET, abs=1e-5)  # residuals are 3e-6 m
     assert f"C1</th><td>{offset:.4g}<" in _content(user, "table-cables")

@@ -6,11 +6,13 @@ import shutil
 import pytest
 
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.boards import write_asked
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run import _boards, _scenes
+from cdpr_drake.studio.verb_panel import view_of
 from cdpr_drake.studio.workbench.yaml_edit import with_value
-from cdpr_drake.studio.workspace import _views
+from cdpr_drake.studio.workspace import TAB, _views
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT, OTHER = "acrobot_small", "planar"
@@ -41,12 +43,17 @@ async def log(user, bench):
 
 
 async def study(user, bench):
-    pass
+    await until(lambda: bench.results.subject("study") is not None)
+
+
+async def answer(user, bench):
+    await until(lambda: bench.results.subject("answer") is not None)
 
 
 RESULTS = {
     "robot": {}, "pose": {"pose-numbers": pose_numbers}, "workspace": {"workspaces": workspaces},
     "run": {"run": run, "compared": compared}, "logs": {"log": log}, "studies": {"study": study},
+    "commands": {"answer": answer},
 }  # fmt: skip
 """How each result of each panel comes to be; a panel that is new has to be here, and be marked."""
 
@@ -68,8 +75,11 @@ def work(tmp_path_factory, computed, alone, beside):
         shutil.copytree(alone, folder / "runs" / name)
     shutil.copytree(beside, folder / "logs" / "small")
     about = {"robot": ROBOT, "digest": subject_of(load_robot(ROBOT)).digest}
-    for below in ("workspaces", "logs"):
-        (folder / below / ".small.about.json").write_text(json.dumps(about))
+    for below, results in (("studies", {}), ("commands", {"robot": ROBOT})):
+        (folder / below / "small").mkdir(parents=True)
+        (folder / below / "small" / "results.json").write_text(json.dumps(results))
+    for below in ("workspaces", "logs", "commands"):
+        write_asked(folder / below / ".small.asked.json", (), about)
     return folder
 
 
@@ -125,10 +135,9 @@ async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, b
     await until(lambda: not in_scene())
     bench.draws(None)
     await until(in_scene)
-    (work / "workspaces" / ".small.about.json").unlink()
-    await until(lambda: not _views[bench].board.choices()["small"].about)
-    _views[bench].take(None)
-    await workspaces(user, bench)
+    (work / "workspaces" / ".small.asked.json").unlink()
+    await until(lambda: not view_of(bench, TAB).board.choices()["small"].about)
+    (work / "workspaces" / "small" / "results.json").touch()  # read anew
     await until(lambda: "whether it was as it is now is not known" in said(user, "workspaces"))
 
 

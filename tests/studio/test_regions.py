@@ -1,4 +1,4 @@
-"""Forms of commands, and what commands left: without a page."""
+"""Workspaces that commands left, as layers and planes of a scene: without a page."""
 
 import json
 
@@ -7,8 +7,6 @@ import pytest
 
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.cli.app import main
-from cdpr_drake.cli.call import shown_arguments
-from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio.regions import (
@@ -20,61 +18,6 @@ from cdpr_drake.studio.regions import (
     read_regions,
     show_regions,
 )
-from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-
-
-@pytest.fixture(scope="module")
-def forms():
-    return command_forms()
-
-
-def test_a_form_has_every_option_of_its_command(forms, capsys):
-    """The list of options is that of the command itself; a new option is in the form at once."""
-    with pytest.raises(SystemExit):
-        main(["workspace", "--help"])
-    help_words = capsys.readouterr().out
-    offered = {option.name for option in forms["workspace"].options}
-    assert all(name in help_words for name in offered)
-    options = {one.name for one in shown_arguments("workspace") if one.name.startswith("--")}
-    assert offered == options - {f"--{name}" for name in LEFT_OUT}
-    assert not {option.key for form in forms.values() for option in form.options} & LEFT_OUT
-    assert forms["workspace"].option("rays").usual == "10000"
-    assert forms["workspace"].option("velocity").many
-    assert forms["study"].option("quick").kind == OptionKind.FLAG
-    assert forms["stability"].option("figure-format").usual == "png"
-
-
-def test_arguments_are_what_was_filled_in(forms, tmp_path):
-    path_of = WorkingFolder(tmp_path).path
-    filled = {
-        "kind": "static", "measure": "payload", "certify": True, "force": " 2.5 ", "rays": "100",
-        "velocity": "0,0,1; 0,0,2", "obstacles": "boxes.yaml", "grid": "",
-    }  # fmt: skip
-    assert forms["workspace"].arguments(filled, path_of) == [
-        "--measure=payload", "--force=2.5", "--velocity=0,0,1", "--velocity=0,0,2",
-        f"--obstacles={tmp_path.resolve() / 'boxes.yaml'}", "--rays=100", "--certify",
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("force", "much"), ("force", "nan"), ("force", "1e999"), ("rays", "1.5"), ("rays", "9" * 5000),
-     ("obstacles", "../secret.yaml"), ("obstacles", "/etc/passwd"), ("mesh", "a\0b"),
-     ("grid", "1\n2")],
-)  # fmt: skip
-def test_a_wrong_value_is_refused_at_its_field(forms, tmp_path, key, value):
-    with pytest.raises(FieldProblem) as problem:
-        forms["workspace"].arguments({key: value}, WorkingFolder(tmp_path).path)
-    assert problem.value.key == key
-    assert len(problem.value.words) <= 500
-
-
-def test_what_a_command_refuses_belongs_to_the_field_it_names(forms):
-    form = forms["workspace"]
-    assert form.field_of("--grid: found 'x'; accepted: numbers") == "grid"
-    assert form.field_of("Invalid value for '--boxes': 0") == "boxes"
-    assert form.field_of("the disk is full") == ""
 
 
 def test_regions_have_the_volumes_that_the_command_printed(computed):
