@@ -15,4 +15,4 @@ TAB = VerbTab(
 
 def commands_panel(bench: Workbench) -> None:
     """Places the panel."""
-    VerbPanel(bench, TAB)
+    VerbPanel(bench, TAB, show=lambda view: view.place(unfolded=True))

@@ -96,19 +96,19 @@ class VerbPanel:
         self._form: VerbForm | None = None
         self._job: VerbJob | None = None
         self._shown: tuple[Path | None, float] = None, 0.0
-        names = tab.verbs or tuple(bench.commands)
-        titles = {name: f"{name}: {bench.commands[name].line}" for name in names}
+        self._verbs = {name: bench.commands[name] for name in tab.verbs or bench.commands}
+        titles = {name: f"{name}: {verb.line}" for name, verb in self._verbs.items()}
         with ui.row().classes("w-full items-center no-wrap"):
-            verb = ui.select(titles, value=self.view.verb, label="what", with_input=not tab.verbs)
-            verb.props("dense outlined").classes("col").mark(f"verb-{tab.folder}")
-            verb.set_visibility(len(titles) > 1)
+            choice = ui.select(titles, value=self.view.verb, label="what", with_input=not tab.verbs)
+            choice.props("dense outlined").classes("col").mark(f"verb-{tab.folder}")
+            choice.set_visibility(len(titles) > 1)
             self.start = ui.button(tab.start, icon="play_circle", on_click=self._start)
             self.start.props("no-caps").mark(f"start-{tab.folder}")
         self._fields = ui.element("div").classes("w-full")
         self._place_bar()
         self._empty = ui.label(tab.empty).classes("studio-empty").mark(f"{tab.folder}-empty")
         self._body = ui.element("div").classes("w-full").mark(f"{tab.folder}-shown")
-        verb.on_value_change(lambda: self._place_form(verb.value))
+        choice.on_value_change(lambda: self._place_form(choice.value))
         ui.timer(0.0, lambda: self._place_form(self.view.verb), once=True)
         ui.timer(TICK, self._tick)
 
@@ -130,7 +130,7 @@ class VerbPanel:
         """Imports a verb in another thread, and places its form."""
         if not name:
             return
-        self.view.verb, self._form, verb = name, None, self._bench.commands[name]
+        self.view.verb, self._form, verb = name, None, self._verbs[name]
         folder = self._bench.folder
         self._fields.clear()
         with self._fields, show_errors():
@@ -182,7 +182,7 @@ class VerbPanel:
         with show_errors():
             entry = self.view.board.shown_entry()
             if entry is not None:
-                self.view.board.go_on(entry, self._bench.commands, self._bench.folder)
+                self.view.board.go_on(entry, self._verbs, self._bench.folder)
             self._refresh()
 
     def _refresh(self) -> Entry[VerbJob] | None:

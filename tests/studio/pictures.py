@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import json
 import tempfile
 import time
 from pathlib import Path
@@ -19,7 +18,7 @@ from selenium.webdriver.common.keys import Keys
 from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.boards import ABOUT
+from cdpr_drake.studio.boards import ASKED, write_asked
 from cdpr_drake.studio.results import subject_of
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.chromium import LONGEST_WAIT, chromium, wait_for
@@ -67,7 +66,7 @@ def fill(folder: Path) -> None:
     simulate(scenario, folder=run)
     replay_log(run / "log.csv", robot="acrobot_small", out=folder / "logs" / "acrobot_pbvs")
     about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
-    (folder / "logs" / f".acrobot_pbvs{ABOUT}").write_text(json.dumps(about))
+    write_asked(folder / "logs" / f".acrobot_pbvs{ASKED}", (), about)
 
 
 def coloured(page: object) -> int:

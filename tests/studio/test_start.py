@@ -18,7 +18,15 @@ LATER = (
 )  # fmt: skip
 """What the page with its first panel needs none of, and takes long to import."""
 
-ONE_OF_EACH = ("undo", "coordinate-2", "start-workspace", "start", "log", "studies-results")
+ONE_OF_EACH = (
+    "undo",
+    "coordinate-2",
+    "start-workspaces",
+    "start",
+    "log",
+    "studies-results",
+    "start-commands",
+)
 """Marks of an element of each panel."""
 
 IMPORTED = """
