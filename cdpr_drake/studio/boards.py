@@ -48,6 +48,7 @@ class Entry(Generic[J]):
         asked: Words by which it goes on; empty: nobody knows them, or it is done.
         about: Name and digest of the robot that it is about; empty: not known.
         is_whole: True if all results are there.
+        changed: When its numbers were written, in seconds since 1970; 0: there are none.
     """
 
     folder: Path
@@ -56,6 +57,7 @@ class Entry(Generic[J]):
     asked: tuple[str, ...] = ()
     about: Mapping[str, str] = field(default_factory=dict)
     is_whole: bool = False
+    changed: float = 0.0
 
     def digest(self, robot: str) -> str:
         """Digest of the robot of a name, as it was when this was asked for; empty: not known."""
@@ -104,9 +106,14 @@ def write_asked(path: Path, words: Sequence[str], about: Mapping[str, str]) -> N
     path.write_text(json.dumps({"words": list(words), **about}), encoding="utf-8")
 
 
+def numbers_file(folder: Path) -> Path | None:
+    """The file with a command's numbers; None: it has not finished in that folder."""
+    return next((folder / name for name in RESULTS if (folder / name).is_file()), None)
+
+
 def has_numbers(folder: Path) -> bool:
     """True if a command has finished in a folder."""
-    return any((folder / name).is_file() for name in RESULTS)
+    return numbers_file(folder) is not None
 
 
 class Board(Generic[J]):
@@ -188,7 +195,11 @@ class Board(Generic[J]):
         words = tuple(map(str, asked.pop("words", ())))
         about = {key: str(value) for key, value in asked.items()}
         name = f"{folder.name}, stopped" if words else folder.name
-        return Entry(folder, name, asked=words, about=about, is_whole=self._is_whole(folder))
+        file = numbers_file(folder)
+        return Entry(
+            folder, name, asked=words, about=about, is_whole=self._is_whole(folder),
+            changed=0.0 if file is None else file.stat().st_mtime,
+        )  # fmt: skip
 
     def _beside(self, folder: Path) -> Path:
         return self.folder / f".{folder.name}{ASKED}"
@@ -197,23 +208,21 @@ class Board(Generic[J]):
 class VerbBoard(Board[VerbJob]):
     """Commands and their results below one folder."""
 
-    def start(
-        self, verb: Verb, words: Sequence[str], name: str,
-        about: Mapping[str, str],
-    ) -> VerbJob:  # fmt: skip
+    async def start(
+        self, verb: Verb, words: Sequence[str], name: str, about: Mapping[str, str]
+    ) -> VerbJob:
         """Begins a verb with results in a new folder of a name, and looks at it.
 
         `words` are those of its form, `about` is name and digest of its robot, if it has one.
         """
         folder = self._jobs.free_folder(self.folder / name)
         with suppress(OSError):  # a full disk, say: the command will tell
-            write_asked(self._beside(folder), words, about)
+            await asyncio.to_thread(write_asked, self._beside(folder), words, about)
         return self._submit(folder, verb, words, about)
 
-    def go_on(
-        self, entry: Entry[VerbJob], verbs: Mapping[str, Verb],
-        folder: WorkingFolder,
-    ) -> VerbJob:  # fmt: skip
+    async def go_on(
+        self, entry: Entry[VerbJob], verbs: Mapping[str, Verb], folder: WorkingFolder
+    ) -> VerbJob:
         """Begins a command anew where it was stopped.
 
         Raises:
@@ -222,7 +231,7 @@ class VerbBoard(Board[VerbJob]):
         verb = verbs.get(entry.asked[0]) if entry.asked else None
         if verb is None or (entry.job is not None and not entry.job.state.is_over):
             raise CdprError(f"{entry.folder.name}: nobody knows how it was asked for, or it works")
-        verb.accept(entry.asked, folder)
+        await asyncio.to_thread(verb.accept, entry.asked, folder)
         return self._submit(entry.folder, verb, entry.asked, entry.about)
 
     def _submit(

@@ -68,7 +68,7 @@ def logs_panel(bench: Workbench) -> None:
         with contents, show_errors():
             sign = ui.spinner(size="lg")
             try:
-                read = await run.io_bound(log_contents, bench.folder.path(name))
+                read = await run.io_bound(lambda: log_contents(bench.folder.path(name)))
             finally:
                 if not sign.is_deleted:  # another log was chosen meanwhile
                     sign.delete()

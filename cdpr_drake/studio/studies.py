@@ -12,7 +12,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.panel import STUDY, show_errors
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import TICK, VerbPanel, VerbTab
-from cdpr_drake.studio.views import View, changed, place_figure, read_results
+from cdpr_drake.studio.views import View, place_figure, read_results
 
 TAB = VerbTab(
     folder="studies", result=STUDY, verbs=("study",), first={"study": ("quick", "seeds")},
@@ -35,8 +35,8 @@ def studies_panel(bench: Workbench) -> None:
 
     async def follow() -> None:
         nonlocal placed
-        whole = [one.folder for one in panel.view.board.choices().values() if one.is_whole]
-        stamp = tuple((folder, changed(folder)) for folder in whole[:MOST_IN_GALLERY])
+        whole = [one for one in panel.view.board.choices().values() if one.is_whole]
+        stamp = tuple((one.folder, one.changed) for one in whole[:MOST_IN_GALLERY])
         if stamp != placed:
             placed = stamp
             views = await run.io_bound(_readable, [folder for folder, _ in stamp])

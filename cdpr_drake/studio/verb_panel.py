@@ -19,7 +19,7 @@ from cdpr_drake.studio.panel import notify, robot_argument, show_errors
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_form import FieldProblem, Filled, VerbForm
-from cdpr_drake.studio.views import View, changed, read_results
+from cdpr_drake.studio.views import View, read_results
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""
@@ -160,7 +160,7 @@ class VerbPanel:
             if len(self._tab.verbs) != 1:
                 names.append(form.verb.title)
             name = "-".join(names) or _stem(words[-1])
-            self._job = self.view.board.start(form.verb, words, name, about)
+            self._job = await self.view.board.start(form.verb, words, name, about)
             self._refresh()
 
     def _choose(self) -> None:
@@ -178,11 +178,11 @@ class VerbPanel:
             entry.job.stop()
         self._refresh()
 
-    def _ask_to_go_on(self) -> None:
+    async def _ask_to_go_on(self) -> None:
         with show_errors():
             entry = self.view.board.shown_entry()
             if entry is not None:
-                self.view.board.go_on(entry, self._verbs, self._bench.folder)
+                await self.view.board.go_on(entry, self._verbs, self._bench.folder)
             self._refresh()
 
     def _refresh(self) -> Entry[VerbJob] | None:
@@ -220,7 +220,7 @@ class VerbPanel:
                 if refused and (self._form is None or not self._form.say(refused)):
                     notify(refused)
             whole = entry if entry is not None and entry.is_whole else None
-            stamp = (None, 0.0) if whole is None else (whole.folder, changed(whole.folder))
+            stamp = (None, 0.0) if whole is None else (whole.folder, whole.changed)
             if stamp != self._shown:
                 self._shown = stamp
                 await self._place_results(whole)

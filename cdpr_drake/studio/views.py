@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from html import escape
@@ -23,7 +22,7 @@ from nicegui import run, ui
 from cdpr_drake.analyses.logs.log import unit_of
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.boards import RESULTS
+from cdpr_drake.studio.boards import numbers_file
 from cdpr_drake.studio.numbers import fact_rows, number_words, plain_table
 from cdpr_drake.studio.panel import show_errors
 
@@ -153,7 +152,7 @@ def read_results(folder: Path) -> View:
     Raises:
         CdprError: Its numbers cannot be read.
     """
-    path = next((folder / name for name in RESULTS if (folder / name).is_file()), None)
+    path = numbers_file(folder)
     if path is None:
         return View.of({}, folder)
     name = f"{folder.name}: {path.name}"
@@ -325,19 +324,14 @@ async def _shown(path: Path) -> bytes:
 
 
 async def send_file(path: Path) -> None:
-    """Hands over a file to the browser, or a folder as a zip archive."""
-    with show_errors():
+    """Hands over a file to the browser, or a folder as a zip archive; another thread reads it."""
+
+    def read() -> tuple[bytes, str]:
         if not path.exists():
             raise CdprError(f"{path.name}: is not there any more")
-        is_folder = path.is_dir()
-        data = await run.io_bound(zipped if is_folder else Path.read_bytes, path)
-        if data is not None:
-            ui.download(data, f"{path.name}.zip" if is_folder else path.name)
+        return (zipped(path), ".zip") if path.is_dir() else (path.read_bytes(), "")
 
-
-def changed(folder: Path) -> float:
-    """When the numbers in a folder were written, in seconds since 1970; 0: there are none."""
-    paths = [path for name in RESULTS if (path := folder / name).is_file()]
-    with suppress(OSError):
-        return max((path.stat().st_mtime for path in paths), default=0.0)
-    return 0.0
+    with show_errors():
+        content = await run.io_bound(read)
+        if content is not None:  # the server is not ending
+            ui.download(content[0], path.name + content[1])

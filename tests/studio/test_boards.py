@@ -44,13 +44,13 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     jobs, folder = JobManager(), WorkingFolder(tmp_path)
     board = VerbBoard(jobs, tmp_path, "workspaces", VerbJob)
     about, words = {"robot": "acrobot_small", "digest": "x"}, ["workspace", "--robot=planar"]
-    first = board.start(every["workspace"], words, "some", about)
+    first = await board.start(every["workspace"], words, "some", about)
     assert jobs.free_folder(first.folder).name == "some-2"
     await until(lambda: first.progress[0] is not None)  # it listens to SIGTERM then
     there = board.shown_entry()
     assert (there.name, there.job, there.asked) == ("some, running", first, ())
     with pytest.raises(CdprError, match="it works"):
-        board.go_on(there, every, folder)
+        await board.go_on(there, every, folder)
     first.stop()
     assert await first.wait(LONGEST)
     await until(lambda: board.choices()["some"].asked)
@@ -63,7 +63,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
     assert there.about == about
     assert (there.digest("acrobot_small"), there.digest("planar")) == ("x", "")
-    second = board.go_on(there, every, folder)
+    second = await board.go_on(there, every, folder)
     assert await second.wait(LONGEST)
     assert second.state == JobState.FINISHED
     assert (second.arguments, second.folder) == (first.arguments, first.folder)
@@ -76,7 +76,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
 async def test_what_leaves_no_folder_leaves_nothing(tmp_path, monkeypatch, every):
     monkeypatch.setattr(Job, "program", (sys.executable, "-c", "raise SystemExit(2)"))
     board = VerbBoard(JobManager(), tmp_path, "commands", VerbJob)
-    job = board.start(every["tension"], ["tension", "--robot=planar"], "some", {})
+    job = await board.start(every["tension"], ["tension", "--robot=planar"], "some", {})
     assert await job.wait(LONGEST)
     await until(lambda: list(board.folder.iterdir()) == [])
 
@@ -106,10 +106,10 @@ async def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, monkeypatch, 
     board = VerbBoard(jobs, tmp_path, "studies", VerbJob)
     await until(board.choices)
     if runs:
-        board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
+        await board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
     else:
         with pytest.raises(CdprError):
-            board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
+            await board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
     assert len(jobs.jobs) == runs
     await jobs.close()
 
