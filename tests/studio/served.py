@@ -12,9 +12,9 @@ LONGEST_START = 600.0
 
 
 @contextmanager
-def served(folder, *arguments):
+def served(folder, *arguments, program=("-m", "cdpr_drake", "studio")):
     """The address of a studio that works in a folder, and its process."""
-    words = [sys.executable, "-m", "cdpr_drake", "studio", *arguments, "--folder", str(folder),
+    words = [sys.executable, *program, *arguments, "--folder", str(folder),
              "--port", "0", "--no-browser"]  # fmt: skip
     # Else NiceGUI takes the port of its own tests.
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "NICEGUI"))}
