@@ -15,10 +15,14 @@ from urllib.parse import urlsplit
 
 import aiohttp
 
+from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.scene_relay import SCENE
 from tests.studio.served import served
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+LAST = f'"name":"{list(PANELS)[-1]}"'
+"""Is said to a page whose panels have all been placed."""
+
 HANDSHAKE = "&client_id={}&implicit_handshake=true&tab_id=x&document_id=y&next_message_id=0"
 """Of NiceGUI's page, and how it says which one it is."""
 
@@ -54,7 +58,7 @@ async def ask(port: int, request: bytes) -> str:
         writer.write_eof()
         line = await asyncio.wait_for(reader.readline(), 20.0)
         return line.split(b" ")[1].decode() if line.count(b" ") > 1 else "none"
-    except (OSError, asyncio.TimeoutError):
+    except (TimeoutError, OSError):
         return "none"
     finally:
         writer.close()
@@ -119,7 +123,7 @@ async def attack(address: str, count: int, seed: int) -> Counter[str]:
                             break
         assert not other.done(), "another page has lost its socket"
         other.cancel()
-        assert await follow(web, "capacity margin"), "a new page gets no numbers"
+        assert await follow(web, LAST), "a new page gets no panels"
     return found
 
 
