@@ -13,6 +13,7 @@ from cdpr_drake.studio.door import BENCH, MOST_SESSIONS, Door, Sessions
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.server import IS_TOKEN, serve
 from tests.messages import printed
+from tests.studio.pages import until
 from tests.studio.served import served
 
 TOKEN = "secret-token-of-a-test"
@@ -175,8 +176,8 @@ async def test_each_session_has_a_workbench_and_those_that_nobody_looks_at_make_
     for number in range(1, MOST_SESSIONS + 5):
         assert await sessions.bench(str(number)) is await sessions.bench(str(number))
         assert await sessions.bench("1") is not first
-    gc.collect()
-    assert len(sessions) == MOST_SESSIONS + 1  # a page shows the first
+    # A page shows the first; a thread that is slow may still have another one in its hand.
+    await until(lambda: gc.collect() >= 0 and len(sessions) == MOST_SESSIONS + 1)
     assert await sessions.bench("0") is first
 
 
