@@ -11,6 +11,7 @@ session. Workbenches belong to such sessions, so that a request without a cookie
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
 import ipaddress
@@ -20,39 +21,30 @@ import socket
 from collections.abc import Awaitable, Callable
 from html import escape
 from urllib.parse import quote, urlencode
+from weakref import WeakValueDictionary
 
 from itsdangerous import Signer
 from starlette.requests import HTTPConnection
-from starlette.responses import HTMLResponse, PlainTextResponse
+from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from cdpr_drake.errors import CdprError
 from cdpr_drake.hosts import is_loopback
-
-LOCAL_NAMES = ("localhost", "127.0.0.1", "::1")
-EVERYWHERE = ("*", "0.0.0.0", "::")
-"""Hosts that stand for all addresses of this machine."""
+from cdpr_drake.studio.session import Workbench
 
 TOKEN, ASKED = "token", "cookie"
 """Keys of the address: the token, and that a cookie was set on the way."""
 
-SESSION = "cdpr_studio_session"
-"""Key of the scope of a request that was let through: its session."""
+BENCH = "cdpr_studio_bench"
+"""Key of the scope of a request that was let through: the workbench of its session."""
 
-SHORTEST_TOKEN = 16
-"""Characters of a token that somebody chooses."""
+MOST_SESSIONS = 24
+"""Workbenches that are kept, of those used last, beside those that a page shows."""
 
-TOKEN_WORDS = f"{SHORTEST_TOKEN} to 200 of the characters A-Z a-z 0-9 . _ ~ -"
-"""What is accepted as a token, which has to stand in an address as it is."""
-
-IS_TOKEN = re.compile(rf"[A-Za-z0-9._~-]{{{SHORTEST_TOKEN},200}}")
-
-PRINTED = "open the address that cdpr studio has printed when it started."
-NO_COOKIE = "A cookie is missing: open the first page of the studio, with cookies allowed."
+PRINTED = "open the address that cdpr studio has printed when it started, with cookies allowed"
 NO_STORE = {"cache-control": "no-store"}
 
-_PLACE = re.compile(
-    r"(?:\[([0-9a-f:.]{2,60})\]|([a-z0-9](?:[a-z0-9._-]{0,252})))(?::([0-9]{1,5}))?"
-)
+_PLACE = re.compile(r"(?:\[([0-9a-f:.]{2,60})\]|([a-z0-9](?:[a-z0-9._-]{0,252})))(?::[0-9]{1,5})?")
 """Name or address, and perhaps a port, in small letters; nothing else, no user, no backslash."""
 
 
@@ -64,13 +56,9 @@ class Door:
     """
 
     def __init__(
-        self,
-        app: ASGIApp,
-        host: str,
-        token: str,
-        port: int,
-        prepare: Callable[[str], Awaitable[None]],
-    ) -> None:
+        self, app: ASGIApp, host: str, token: str, port: int,
+        bench: Callable[[str], Awaitable[Workbench]],
+    ) -> None:  # fmt: skip
         """Of an application that listens at a host.
 
         Args:
@@ -78,32 +66,38 @@ class Door:
             host: Name or address at which it listens.
             token: What is asked for; empty: nothing, but sessions are told by cookies all the same.
             port: Its port, part of the cookie's name, since cookies know no ports.
-            prepare: Called with the session of a request before the application is.
+            bench: Returns the workbench of a session, which the application gets with the request.
         """
-        self._app, self._host, self._token, self._prepare = app, host.lower(), token, prepare
+        self._app, self._host, self._token, self._bench = app, host.lower(), token, bench
         self._name = f"cdpr_studio_{port}"
         key = token or secrets.token_urlsafe(32)
         self._signer = Signer(key, salt=self._name, digest_method=hashlib.sha256)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answers in the application's place, or lets it answer."""
-        if scope["type"] not in ("http", "websocket"):
-            await self._app(scope, receive, send)
-            return
-        request = HTTPConnection(scope)
-        session = self._session(request)
-        refused = self._refused(request)
-        if not refused and self._hands_cookie(request, session):
-            await self._cookie_page(request, session)(scope, receive, send)
-        elif not refused and session:
-            scope[SESSION] = session
-            await self._prepare(session)
+        is_request = scope["type"] in ("http", "websocket")
+        answer = await self._answer(HTTPConnection(scope)) if is_request else None
+        if answer is None:
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
-            none = f"A token is missing: {PRINTED}" if self._token else NO_COOKIE
-            await PlainTextResponse(f"{refused or none}\n", 403, NO_STORE)(scope, receive, send)
+            await answer(scope, receive, send)
+
+    async def _answer(self, request: HTTPConnection) -> Response | None:
+        """What is answered in the application's place; None: it may answer."""
+        session, words, status = self._session(request), self._refusal(request), 403
+        if not words and self._hands_cookie(request, session):
+            return self._cookie_page(request, session)
+        if not words and session:
+            try:
+                request.scope[BENCH] = await self._bench(session)
+                return None
+            except (CdprError, OSError) as problem:
+                words, status = str(problem), 500
+        return PlainTextResponse(
+            f"{words or f'A cookie is missing: {PRINTED}'}\n", status, NO_STORE
+        )
 
     def _session(self, request: HTTPConnection) -> str:
         """The session of a request; empty: it has no cookie of this server."""
@@ -112,15 +106,15 @@ class Door:
         # Signed anew: to unsign takes some texts for the same signature.
         return session if hmac.compare_digest(self._signer.sign(session), value.encode()) else ""
 
-    def _refused(self, request: HTTPConnection) -> str:
-        """Why a request is not accepted by where it goes and comes from, or by a token that is
-        wrong; empty: it is."""
+    def _refusal(self, request: HTTPConnection) -> str:
+        """Why a request is refused for where it goes or comes from, or a wrong token, or empty."""
         hosts, origins = (request.headers.getlist(name) for name in ("host", "origin"))
-        place = _place(hosts[0]) if len(hosts) == 1 else None
-        if place is None or not self.knows(place[0]):
+        host = hosts[0].lower() if len(hosts) == 1 else ""
+        place = _PLACE.fullmatch(host)
+        if place is None or not self.knows(place[1] or place[2]):
             found = ", ".join(hosts)[:80]
             return f"Host: found {found!r}; accepted: a name or address of this machine"
-        if any(_origin(origin) != place for origin in origins):
+        if any(origin.lower() not in (f"http://{host}", f"https://{host}") for origin in origins):
             return f"Origin: found {', '.join(origins)[:80]!r}; accepted: pages of the studio"
         tokens = request.query_params.getlist(TOKEN) if self._token else []
         right = self._token.encode()
@@ -129,17 +123,14 @@ class Door:
 
     def knows(self, name: str) -> bool:
         """Whether a name means this machine, and can mean no other one tomorrow."""
-        if name in LOCAL_NAMES or name == self._host:
+        if name in ("localhost", "127.0.0.1", "::1", self._host):
             return True
         if is_loopback(self._host):
             return False
-        if name in (socket.gethostname().lower(), socket.getfqdn().lower()):
-            return True
         try:
-            ipaddress.ip_address(name)
+            return bool(ipaddress.ip_address(name))  # it needs no DNS, so nobody can rebind it
         except ValueError:
-            return False
-        return True  # an address needs no DNS, so nobody can rebind it
+            return name in (socket.gethostname().lower(), socket.getfqdn().lower())
 
     def _hands_cookie(self, request: HTTPConnection, session: str) -> bool:
         """Whether a request is answered with a cookie, or with an address without the token."""
@@ -172,13 +163,30 @@ class Door:
         return page
 
 
-def _place(text: str) -> tuple[str, str] | None:
-    """Name and port of a header `Host`; None: it is not written as the standard has it."""
-    found = _PLACE.fullmatch(text.lower())
-    return None if found is None else (found[1] or found[2], found[3] or "")
+class Sessions:
+    """Workbenches by the names of browser sessions."""
 
+    def __init__(self, make: Callable[[], Workbench]) -> None:
+        """With what makes a new workbench."""
+        self._make = make
+        self._benches: WeakValueDictionary[str, Workbench] = WeakValueDictionary()
+        self._latest: dict[str, Workbench] = {}
 
-def _origin(text: str) -> tuple[str, str] | None:
-    """Name and port of a header `Origin`; None: it is not written as the standard has it."""
-    scheme, _, place = text.lower().partition("://")
-    return _place(place) if scheme in ("http", "https") else None
+    async def bench(self, session: str) -> Workbench:
+        """The workbench of a session, made in another thread if there is none: it reads files.
+
+        Raises:
+            CdprError: It cannot be made.
+        """
+        bench = self._benches.get(session)
+        if bench is None:
+            made = await asyncio.to_thread(self._make)
+            bench = self._benches.setdefault(session, made)  # of two requests at once, the first
+        self._latest.pop(session, None)
+        self._latest[session] = bench
+        if len(self._latest) > MOST_SESSIONS:
+            del self._latest[next(iter(self._latest))]
+        return bench
+
+    def __len__(self) -> int:
+        return len(self._benches)

@@ -6,16 +6,15 @@ Errors are messages, too: whatever a handler raises, the server stays alive, see
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import import_module
 from inspect import iscoroutinefunction
 
 from nicegui import background_tasks, ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.calculator import Signal
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 
@@ -40,15 +39,15 @@ class Panel:
         icon: Name of a Material icon.
         place: Its function that places the elements into the current slot, for a workbench, as
             `module:function`; the module is imported behind the page.
-        results: The results that it shows by name, with words for a person. It tells
-            `Workbench.results` what each is about, and the page says above the panel which are
-            about something else than what is open.
+        results: Titles of the results that it shows, by name. The panel tells `Workbench.results`
+            what each is about; the page says above the panel which are about something else than
+            what is open.
     """
 
     title: str
     icon: str
     place: str
-    results: Mapping[str, str]
+    results: dict[str, str] = field(default_factory=dict)
 
     def load(self) -> Callable[[Workbench], None]:
         """Imports what the panel needs; returns its function."""
@@ -57,7 +56,7 @@ class Panel:
 
 
 PANELS = {
-    "robot": Panel("Robot", "precision_manufacturing", "panels.robot:robot_panel", {}),
+    "robot": Panel("Robot", "precision_manufacturing", "panels.robot:robot_panel"),
     "pose": Panel("Pose", "open_with", "pose:pose_panel", {POSE_NUMBERS: "Numbers"}),
     "workspace": Panel(
         "Workspace", "view_in_ar", "workspace:workspace_panel", {WORKSPACES: "Workspaces"}
@@ -74,33 +73,33 @@ PANELS = {
 
 
 def place_remarks(bench: Workbench, panel: Panel) -> None:
-    """Places what is to be said about the results of a panel that are about something else."""
-    labels, prints = {}, {}
-    for name in panel.results:
-        labels[name] = ui.label().classes("studio-stale").props('role="status"')
-        labels[name].mark(f"about-{name}")
-        if (
-            name == POSE_NUMBERS
-        ):  # always of the robot that is open, and new at each step of a slider
-            labels[name].classes("studio-kept")
-        else:
-            prints[name] = ui.label().classes("studio-fingerprint").mark(f"fingerprint-{name}")
+    """Places what is to be said about the results of a panel: of which robot they are."""
+    results = bench.results
+    rows = {name: (ui.label().mark(f"about-{name}"), ui.label().mark(f"fingerprint-{name}"))
+            for name in panel.results}  # fmt: skip
+    for name, (differs, print_) in rows.items():
+        # Numbers at the pose change with each step of a slider: their row is always there.
+        differs.classes(f"studio-stale {'studio-kept' if name == POSE_NUMBERS else ''}")
+        differs.props('role="status"')
+        print_.classes("studio-fingerprint")
 
     def refresh() -> None:
-        for name, label in labels.items():
-            words = bench.results.differs(name)
-            label.text = f"{panel.results[name]}: {words}." if words else ""
-        for name, label in prints.items():
-            subject = bench.results.subject(name)
-            label.text = ""
-            if subject is not None and subject.digest:
-                label.text = f"{panel.results[name]}: {subject.robot}, {subject.fingerprint}"
+        for name, (differs, print_) in rows.items():
+            title, words, subject = (
+                panel.results[name],
+                results.differs(name),
+                results.subject(name),
+            )
+            differs.text = f"{title}: {words}." if words else ""
+            print_.text = ""
             if subject is not None:  # robots of its own are nothing to be warned of
                 soft = "" if subject.robot else "studio-soft"
-                labels[name].classes(add=soft, remove="" if soft else "studio-soft")
+                differs.classes(add=soft, remove="" if soft else "studio-soft")
+                if subject.digest and name != POSE_NUMBERS:
+                    print_.text = f"{title}: {subject.robot}, {subject.fingerprint}"
 
     refresh()
-    on_page(bench.results.changed, refresh)
+    on_page(results.changed, refresh)
 
 
 def on_page(signal: Signal, listener: Callable[[], Awaitable[None] | None]) -> None:
@@ -126,21 +125,18 @@ def robot_argument(bench: Workbench) -> str:
     Raises:
         CdprError: It is in no file.
     """
-    name = bench.command_name
-    if not name:
+    if not (name := bench.command_name):
         raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
-    return name if name in robot_names() else str(bench.folder.path(name))
+    return str(bench.robot.path) if name == bench.file else name
 
 
 def message(problem: BaseException) -> str:
     """What a problem says, for people, at most `LONGEST` characters a line."""
-    if isinstance(problem, CdprError):
-        words = str(problem)
-    elif isinstance(problem, OSError):
-        where = f"{problem.filename}: " if problem.filename else ""
-        words = f"{where}{problem.strerror or problem}"
-    else:
-        words = f"{type(problem).__name__}: {' '.join(str(problem).split()) or 'nothing is known'}"
+    words = str(problem)
+    if isinstance(problem, OSError):
+        words = f"{problem.filename or ''}: {problem.strerror or problem}".removeprefix(": ")
+    elif not isinstance(problem, CdprError):
+        words = f"{type(problem).__name__}: {' '.join(words.split()) or 'nothing is known'}"
     lines = ["".join(c if c.isprintable() else repr(c)[1:-1] for c in x) for x in words.split("\n")]
     return "\n".join(
         line if len(line) <= LONGEST else f"{line[: LONGEST * 3 // 4]} ... {line[-LONGEST // 5 :]}"
@@ -154,13 +150,9 @@ def notify(words: str, kind: str = "negative", *, stays: bool = False) -> None:
     What is wrong, and what `stays`, is there until it is closed, all else for four seconds.
     """
     ui.notify(
-        words,
-        type=kind,  # type: ignore[arg-type]
-        multi_line=True,
-        close_button="Close",
+        words, type=kind, multi_line=True, close_button="Close", classes="studio-notice",  # type: ignore[arg-type]
         timeout=0 if stays or kind == "negative" else 4000,
-        classes="studio-notice",
-    )
+    )  # fmt: skip
 
 
 @contextmanager

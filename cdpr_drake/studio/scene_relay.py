@@ -9,15 +9,14 @@ since Drake ends the process at a message that it cannot read.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import aiohttp
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
+from starlette.requests import HTTPConnection
 
-from cdpr_drake.studio.door import SESSION
-from cdpr_drake.studio.session import Workbench
+from cdpr_drake.studio.door import BENCH
 
 SCENE = "/scene/"
 PAGE = "meshcat.html"
@@ -31,63 +30,49 @@ LARGEST_MESSAGE = 64_000_000
 TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
 
 
-def add_scene_relay(app: FastAPI, bench_of: Callable[[str], Workbench | None]) -> None:
-    """Adds the routes below `SCENE` to the server; `bench_of` says the workbench of a session."""
+def add_scene_relay(app: FastAPI) -> None:
+    """Adds the routes below `SCENE` to a server behind a `Door`."""
 
     @app.get(SCENE + "{name:path}", include_in_schema=False)
     async def asset(request: Request, name: str) -> Response:
-        bench = bench_of(request.scope.get(SESSION, ""))
-        if bench is None:
-            return Response("There is no session; reload the page.", status_code=404)
         page = name or PAGE
-        async with await _scene(bench) as scene, scene.get(f"http://scene/{page}") as answer:
+        async with await _scene(request) as scene, scene.get(f"http://scene/{page}") as answer:
             body = await answer.read()
         if page == PAGE:
             body = body.replace(b"</head>", b"<style>" + STYLE + b"</style></head>", 1)
             body = body.replace(b"</body>", b"<script>" + SCRIPT + b"</script></body>", 1)
-        return Response(
-            body, answer.status, media_type=TYPES.get(Path(page).suffix, "application/octet-stream")
-        )
+        kind = TYPES.get(Path(page).suffix, "application/octet-stream")
+        return Response(body, answer.status, media_type=kind)
 
     @app.websocket(SCENE)
     async def messages(socket: WebSocket) -> None:
-        bench = bench_of(socket.scope.get(SESSION, ""))
-        if bench is None:
-            await socket.close(1008)
-            return
         await socket.accept()
-        with suppress(aiohttp.ClientError, WebSocketDisconnect, RuntimeError):
+
+        async def down() -> None:
             async with (
-                await _scene(bench) as scene,
+                await _scene(socket) as scene,
                 scene.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
             ):
-                await _relay(socket, meshcat)
+                async for message in meshcat:
+                    if message.type == aiohttp.WSMsgType.BINARY:
+                        await socket.send_bytes(message.data)
+
+        async def up() -> None:
+            while (await socket.receive())["type"] != "websocket.disconnect":
+                pass
+
+        both = [asyncio.create_task(down()), asyncio.create_task(up())]
+        try:
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in both:
+                task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
         with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
             await socket.close()
 
 
-async def _scene(bench: Workbench) -> aiohttp.ClientSession:
-    """What asks the scene of a workbench."""
-    door = await asyncio.wrap_future(bench.scene_address())
-    return aiohttp.ClientSession(connector=aiohttp.UnixConnector(door))
-
-
-async def _relay(socket: WebSocket, meshcat: aiohttp.ClientWebSocketResponse) -> None:
-    """Hands on what the scene says, until one side ends; drops what the browser says."""
-
-    async def down() -> None:
-        async for message in meshcat:
-            if message.type == aiohttp.WSMsgType.BINARY:
-                await socket.send_bytes(message.data)
-
-    async def up() -> None:
-        while (await socket.receive())["type"] != "websocket.disconnect":
-            pass
-
-    both = [asyncio.create_task(down()), asyncio.create_task(up())]
-    try:
-        await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in both:
-            task.cancel()
-        await asyncio.gather(*both, return_exceptions=True)
+async def _scene(request: HTTPConnection) -> aiohttp.ClientSession:
+    """What asks the scene of a request's session; who goes away does not end its making."""
+    path = await asyncio.shield(asyncio.wrap_future(request.scope[BENCH].scene_address()))
+    return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import secrets
 import socket
 from collections.abc import Callable, Mapping
@@ -17,20 +18,21 @@ from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.calculator import Calculator
-from cdpr_drake.studio.door import (
-    EVERYWHERE,
-    IS_TOKEN,
-    TOKEN,
-    TOKEN_WORDS,
-    Door,
-)
+from cdpr_drake.studio.door import TOKEN, Door, Sessions
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
+<<<<<<< HEAD
 from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.verb_form import Verb
+=======
+from cdpr_drake.studio.workbench.command_form import CommandForm
+>>>>>>> door-ready
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
+
+IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")
+"""What is accepted as a token, which has to stand in an address as it is."""
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
@@ -65,7 +67,16 @@ def serve(
         CdprError: What shall be opened or the token is not accepted, or the address cannot be
             listened at.
     """
-    _check_token(token, host)
+    if token and not IS_TOKEN.fullmatch(token):
+        raise CdprError(
+            f"token: found {len(token)} characters; accepted: 16 to 200 of the characters "
+            "A-Z a-z 0-9 . _ ~ -"
+        )
+    if token == "" and not is_loopback(host):
+        raise CdprError(
+            f"--no-token: found it with --host {host}, which other machines reach; "
+            "accepted: with an address of this machine alone, such as 127.0.0.1"
+        )
     robot, scenario = _opened(opened)
     work, jobs, calculator = WorkingFolder(folder), JobManager(), Calculator()
 
@@ -73,9 +84,8 @@ def serve(
         return Workbench(work, robot, scenario, calculator=calculator, jobs=jobs, commands=commands)
 
     make()  # says now what is wrong with it
-    sessions = Sessions(make)
-    name = socket.gethostname() if host in EVERYWHERE else host
-    bound = "0.0.0.0" if host in EVERYWHERE else host
+    is_everywhere = host in ("*", "0.0.0.0", "::")
+    name, bound = (socket.gethostname(), "0.0.0.0") if is_everywhere else (host, host)
     port = _free_port(bound, port)
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
     said = f"{address} , with the token that was set ;"
@@ -98,28 +108,14 @@ def serve(
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
-    add_scene_relay(app, sessions.bench_of)
-    put_before_all(host, token, port, sessions)
+    add_scene_relay(app)
+    put_before_all(host, token, port, Sessions(make))
     app.config.quasar_config["loadingBar"] = {"skipHijack": True}  # it has no name to be read aloud
     ui.run(
-        make_page(sessions), host=bound, port=port, title="cdpr studio", show=False, reload=False,
-        show_welcome_message=False, access_log=False, dark=None, reconnect_timeout=LONGEST_ABSENCE,
+        make_page(), host=bound, port=port, title="cdpr studio", language="en-US", dark=None,
+        show=False, reload=False, show_welcome_message=False, access_log=False,
+        reconnect_timeout=LONGEST_ABSENCE,
     )  # fmt: skip
-
-
-def _check_token(token: str | None, host: str) -> None:
-    """Refuses a token that is set.
-
-    Raises:
-        CdprError: It is not accepted, or there shall be none where other machines reach the page.
-    """
-    if token and not IS_TOKEN.fullmatch(token):
-        raise CdprError(f"token: found {len(token)} characters; accepted: {TOKEN_WORDS}")
-    if token == "" and not is_loopback(host):
-        raise CdprError(
-            f"--no-token: found it with --host {host}, which other machines reach; "
-            "accepted: with an address of this machine alone, such as 127.0.0.1"
-        )
 
 
 def put_before_all(host: str, token: str, port: int, sessions: Sessions) -> None:
@@ -129,7 +125,7 @@ def put_before_all(host: str, token: str, port: int, sessions: Sessions) -> None
     """
     build = app.build_middleware_stack
     app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
-        build(), host, token, port, sessions.prepare
+        build(), host, token, port, sessions.bench
     )
 
 

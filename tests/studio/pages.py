@@ -10,7 +10,6 @@ from cdpr_drake.cli.studio import verbs
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 
@@ -32,11 +31,12 @@ async def simulated(root):
 async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, their workbench and client."""
     calculator = Calculator()
-    sessions = Sessions(lambda: _bench(folder, robot, calculator))
+    folder = WorkingFolder(folder)
+    bench = Workbench(folder, robot, calculator=calculator, commands=command_forms)
     try:
-        async with simulated(make_page(sessions, lambda _: "one")) as user:
+        async with simulated(make_page(lambda _: bench)) as user:
             await until(lambda: not _loading(user))
-            yield user, next(iter(sessions.benches())), user.client
+            yield user, bench, user.client
     finally:
         calculator.close()
 
@@ -94,10 +94,13 @@ def _loading(user):
         return bool(list(ElementFilter(marker="panel-loading")))
 
 
+<<<<<<< HEAD
 def _bench(folder, robot, calculator):
     return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=verbs)
 
 
+=======
+>>>>>>> door-ready
 async def until(condition, seconds=300.0):
     """Waits until something holds; kernels may have to be compiled first."""
     for _ in range(int(seconds / 0.02)):

@@ -1,26 +1,29 @@
 """The studio as a user starts it: `cdpr studio` in a process of its own."""
 
 import os
-import select
 import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from threading import Thread
 
 LONGEST_START = 600.0
 """Until the address is printed [s]; Drake is imported before."""
 
 
 @contextmanager
-def served(folder, *arguments):
-    """The address of a studio that works in a folder, and its process."""
-    words = [sys.executable, "-m", "cdpr_drake", "studio", *arguments, "--folder", str(folder),
-             "--port", "0", "--no-browser"]  # fmt: skip
+def served(folder, *arguments, program=("-m", "cdpr_drake", "studio")):
+    """The address of a studio that works in a folder, its process, with what it has `said`."""
+    words = [sys.executable, *program, *arguments, "--folder", str(folder), "--port", "0",
+             "--no-browser"]  # fmt: skip
     # Else NiceGUI takes the port of its own tests.
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "NICEGUI"))}
     process = subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment
     )
+    process.said = []
+    reader = Thread(target=lambda: [process.said.append(line) for line in process.stdout])
+    reader.start()  # or the server would wait, once the pipe is full
     try:
         yield _address(process), process
     finally:
@@ -30,16 +33,15 @@ def served(folder, *arguments):
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
+        reader.join()
         process.stdout.close()
 
 
 def _address(process):
-    said, end = "", time.monotonic() + LONGEST_START
+    end = time.monotonic() + LONGEST_START
     while time.monotonic() < end and process.poll() is None:
-        if not select.select([process.stdout], [], [], 0.2)[0]:
-            continue
-        line = process.stdout.readline()
-        if line.startswith("cdpr studio at "):
-            return line.split()[3]
-        said += line
-    raise AssertionError(f"the studio did not start: {said}")
+        for line in list(process.said):
+            if line.startswith("cdpr studio at "):
+                return line.split()[3]
+        time.sleep(0.05)
+    raise AssertionError(f"the studio did not start: {''.join(process.said)}")
