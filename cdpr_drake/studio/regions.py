@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.proofs.box_figures import box_solids
 from cdpr_drake.proofs.certified_workspace import load_boxes
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import WorkspaceVolume
 
 REGIONS, PLANE = "workspaces", "workspaces/plane"
@@ -113,36 +115,41 @@ def read_regions(folder: Path) -> Regions:
         of_stability = isinstance(summary["workspaces"], list)
     except (OSError, ValueError, KeyError, TypeError) as problem:
         raise CdprError(f"{folder.name}: {RESULTS} cannot be read: {problem}") from problem
-    values: dict[str, Array] = {}
-    if of_stability:
-        stability = load_stability(folder)
-        axes, units = stability.grid.axes, dict[str, str]()
-        layers = [
-            _layer(
-                f"{bounds} {kind}",
-                STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}"),
-                stability.volume(kind, bounds=bounds), solid, color,
-            )
-            for bounds, kind, solid, color in stability_solids(stability)
-        ]  # fmt: skip
-        for name, margin in zip(stability.names, stability.margin, strict=True):
-            values[f"margin, bounds {name}"], units[f"margin, bounds {name}"] = margin, "-"
-    else:
-        workspace = load_workspace(folder)
-        axes, units = workspace.grid.axes, {name: MEASURES[name].unit for name in workspace.values}
-        layers = [
-            _layer(name, summary["workspaces"][name]["title"], workspace.volume(name), solid, color)
-            for name, solid, color in workspace_solids(workspace)
-        ]
-        values = workspace.values
-        if "hull" in summary:
-            hull = load_hull(folder)
-            title = "what is seen of it from a centre, by rays"
-            layers.append(Layer("hull", title, hull.volume, "m^3", None, *hull_solid(hull)))
-        if "certified" in summary:
-            layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+    grid, layers, values, units = (_of_stability if of_stability else _of_kinds)(folder, summary)
     least = {name: np.asarray(np.min(each, axis=0), float) for name, each in values.items()}
-    return Regions(folder, str(summary["robot"]), axes, tuple(layers), least, units)
+    return Regions(folder, str(summary["robot"]), grid.axes, tuple(layers), least, units)
+
+
+_Parts = tuple[WorkspaceGrid, list[Layer], Mapping[str, Array], dict[str, str]]
+"""Grid, layers, values at its poses by name, and their units."""
+
+
+def _of_stability(folder: Path, summary: Mapping[str, Any]) -> _Parts:
+    stability = load_stability(folder)
+    layers = []
+    for bounds, kind, solid, color in stability_solids(stability):
+        title = STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}")
+        volume = stability.volume(kind, bounds=bounds)
+        layers.append(_layer(f"{bounds} {kind}", title, volume, solid, color))
+    names = [f"margin, bounds {name}" for name in stability.names]
+    values = dict(zip(names, stability.margin, strict=True))
+    return stability.grid, layers, values, dict.fromkeys(names, "-")
+
+
+def _of_kinds(folder: Path, summary: Mapping[str, Any]) -> _Parts:
+    workspace = load_workspace(folder)
+    layers = [
+        _layer(name, summary["workspaces"][name]["title"], workspace.volume(name), solid, color)
+        for name, solid, color in workspace_solids(workspace)
+    ]
+    if "hull" in summary:
+        hull = load_hull(folder)
+        title = "what is seen of it from a centre, by rays"
+        layers.append(Layer("hull", title, hull.volume, "m^3", None, *hull_solid(hull)))
+    if "certified" in summary:
+        layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+    units = {name: MEASURES[name].unit for name in workspace.values}
+    return workspace.grid, layers, workspace.values, units
 
 
 def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rgba) -> Layer:
