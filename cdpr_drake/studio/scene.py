@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
 from cdpr_drake.analyses.visualization.replay import RobotPicture
@@ -44,8 +44,12 @@ WORKSPACE_COLOR = Rgba(0.94, 0.76, 0.48, 0.45)
 Solid = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3)."""
 
-VIEW = np.radians([-57.0, 36.0])
-"""Azimuth and elevation of the eye [rad]: the points of each robot of the package lie apart."""
+R_EW = (
+    RotationMatrix.MakeXRotation(np.radians(-54.0))
+    @ RotationMatrix.MakeZRotation(np.radians(-33.0))
+).matrix()
+"""The eye's axes: right, up, back. It is 36 deg above and 33 deg to the right of the front: there
+the points of each robot of the package lie apart."""
 
 REACH = 0.94 * np.tan(np.radians(37.5)) * np.array([1.25, 1.0])
 """What a robot fills of the scene across and up, per distance: Meshcat's angle of view, see also
@@ -151,20 +155,16 @@ class RobotScene:
 
 def look_at_robot(meshcat: Meshcat, robot: Robot) -> None:
     """Looks at a robot with its frame from the front and above; all of it fills the window."""
-    cables, (azimuth, elevation) = robot.cable_set(), VIEW
+    cables = robot.cable_set()
     corners = list(product(*zip(robot.frame.lower, robot.frame.upper, strict=True)))
     anchors = robot.home.transform().multiply(cables.p_PB)
-    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
-    level = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    back = np.cos(elevation) * level + np.array([0.0, 0.0, np.sin(elevation)])
-    axes = np.array([right, np.cross(back, right), back])
-    p = axes @ np.column_stack([np.array(corners).T, cables.p_WA, anchors])
+    p = R_EW @ np.column_stack([np.array(corners).T, cables.p_WA, anchors])
     # A point is in the window if |p - eye| <= REACH (eye - p)_z, across and up.
     first, last = (np.max(sign * p[:2].T + REACH * p[2:].T, axis=0) for sign in (-1.0, 1.0))
     distance = float(np.max((first + last) / (2.0 * REACH)))
-    eye = np.array([*(last - first) / 2.0, distance]) @ axes
+    eye = np.array([*(last - first) / 2.0, distance])
     depth = distance - float(np.mean([np.min(p[2]), np.max(p[2])]))
-    meshcat.SetCameraPose(eye, eye - depth * back)
+    meshcat.SetCameraPose(R_EW.T @ eye, R_EW.T @ (eye - [0.0, 0.0, depth]))
     for name, share in (("near", 5e-3), ("far", 50.0)):
         meshcat.SetProperty("/Cameras/default/rotated/<object>", name, share * depth)
 

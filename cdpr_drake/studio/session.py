@@ -93,6 +93,7 @@ class Workbench:
         self.robot: Document[Robot] = Document(
             robot_text(robot, "the studio"), where, self.files.read
         )
+        self._shipped = {robot_file(name).resolve(): name for name in robot_names()}
         self._texts: dict[Path, str] = {}  # of robot files
         if where.is_file() and not is_foreign(where):  # of which a name with rails has another text
             self._texts[where] = where.read_text(encoding="utf-8")
@@ -143,11 +144,7 @@ class Workbench:
     @property
     def command_name(self) -> str:
         """By which commands know the robot as it is, in the folder; empty: they do not."""
-        if not self.is_saved:
-            return ""
-        name = self.robot.value.name
-        shipped = name in robot_names() and self.robot.path == robot_file(name).resolve()
-        return name if shipped else self.file
+        return self._shipped.get(self.robot.path, self.file) if self.is_saved else ""
 
     @property
     def state(self) -> str:
@@ -186,7 +183,7 @@ class Workbench:
         """Works with what `files.open`, or `files.upload`, has read, perhaps in another thread."""
         if uploaded:
             self._texts.pop(opened.path, None)
-        elif not opened.notes and opened.path.is_file():
+        elif not opened.notes:
             self._texts[opened.path] = opened.text
         if opened.notes:
             self._assumed[opened.path] = opened.notes
@@ -198,16 +195,24 @@ class Workbench:
         return self.take_opened(opened, uploaded=True)
 
     def save(self, name: str, overwrite: bool) -> None:
-        """Writes the robot's file into the folder.
+        """Writes the robot's file into the folder, and works with that.
 
         Raises:
             CdprError: The name is not accepted, the file is there already, or cannot be written.
         """
+        self.take_saved(*self.write(name, overwrite))
+
+    def write(self, name: str, overwrite: bool) -> tuple[Path, str]:
+        """Writes the robot's file, perhaps in another thread; its path and text, see `save`."""
         if not name.lower().endswith((".yaml", ".yml")):
             raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
         path, text = self.folder.path(name), self.robot.text
         self.files.read(text, path)  # it may name files that are not there
         self.folder.write(name, text, overwrite or name == self.file)
+        return path, text
+
+    def take_saved(self, path: Path, text: str) -> None:
+        """Works with a file that `write` has written."""
         self._texts[path] = text
         if self.assumed:
             self._assumed[path] = self.assumed
@@ -255,9 +260,8 @@ class Workbench:
         robot, p = self.questions.robot, self.X_WP.translation()
         lower, upper = robot.frame.bounds()
         near = robot.joint().nearest(self.X_WP)
-        return bool(
-            np.any(p < lower) or np.any(p > upper) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
-        )
+        outside = np.any((p < lower) | (p > upper))
+        return bool(outside) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
 
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""

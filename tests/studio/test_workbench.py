@@ -126,9 +126,10 @@ def test_points_are_dragged(bench):
 
 def test_files_of_the_folder_are_saved_and_opened(bench, tmp_path, monkeypatch):
     assert not bench.file
-    with monkeypatch.context() as patch, pytest.raises(OutputFolderError, match="No space left"):
+    with monkeypatch.context() as patch:
         patch.setattr("pathlib.Path.replace", full_disk)
-        bench.save("a.yaml", overwrite=False)
+        with pytest.raises(OutputFolderError, match="No space left"):
+            bench.save("a.yaml", overwrite=False)
     assert not list(tmp_path.iterdir())
     bench.save("a.yaml", overwrite=False)
     assert (bench.file, bench.is_saved) == ("a.yaml", True)
