@@ -191,17 +191,14 @@ def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
     if plane is None:
         meshcat.Delete(PLANE)
         return
-    u, v = (k for k in range(3) if k != plane.along)
-    axes = regions.axes
-    first, second = np.meshgrid(axes[u], axes[v], indexing="ij")
-    vertices = np.empty((first.size, 3))
-    vertices[:, u], vertices[:, v] = first.ravel(), second.ravel()
-    vertices[:, plane.along] = axes[plane.along][plane.index]
-    values = np.take(regions.values[plane.name], plane.index, plane.along).ravel()
-    corner = np.arange(first.size).reshape(first.shape)
-    a, b = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel()
-    c, d = corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    grid = np.stack(np.meshgrid(*regions.axes, indexing="ij"), axis=-1)
+    points, values = (
+        np.take(each, plane.index, plane.along) for each in (grid, regions.values[plane.name])
+    )
+    corner = np.arange(values.size).reshape(values.shape)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1)
+    faces = quads.reshape(-1, 4)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    vertices, values = points.reshape(-1, 3), values.ravel()
     colors = colors_of(values, regions.range(plane.name))
     meshcat.SetTriangleColorMesh(
         PLANE, np.asfortranarray(vertices.T), np.asfortranarray(faces.T.astype(np.int32)),

@@ -45,15 +45,16 @@ Solid = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3)."""
 
 R_EW = (
-    RotationMatrix.MakeXRotation(np.radians(-54.0))
-    @ RotationMatrix.MakeZRotation(np.radians(-33.0))
+    RotationMatrix.MakeXRotation(np.radians(-65.0)) @ RotationMatrix.MakeZRotation(np.radians(5.0))
 ).matrix()
-"""The eye's axes: right, up, back. It is 36 deg above and 33 deg to the right of the front: there
-the points of each robot of the package lie apart."""
+"""The eye's axes: right, up, back. It is 25 deg above and 5 deg to the left of the front: there all
+points of the robots of the package lie apart."""
 
-REACH = 0.94 * np.tan(np.radians(37.5)) * np.array([1.25, 1.0])
-"""What a robot fills of the scene across and up, per distance: Meshcat's angle of view, see also
-`scene.js`, less a margin."""
+FIELD = 50.0
+"""The eye's angle of view, up [deg]."""
+
+REACH = 0.88 * np.tan(np.radians(FIELD / 2.0)) * np.array([1.25, 1.0])
+"""What a robot fills of it across and up, per distance; `scene.js` has at least that across."""
 
 POINT_SIZE = 0.011
 """Radius of a point, of the diagonal of the frame."""
@@ -165,8 +166,8 @@ def look_at_robot(meshcat: Meshcat, robot: Robot) -> None:
     eye = np.array([*(last - first) / 2.0, distance])
     depth = distance - float(np.mean([np.min(p[2]), np.max(p[2])]))
     meshcat.SetCameraPose(R_EW.T @ eye, R_EW.T @ (eye - [0.0, 0.0, depth]))
-    for name, share in (("near", 5e-3), ("far", 50.0)):
-        meshcat.SetProperty("/Cameras/default/rotated/<object>", name, share * depth)
+    for name, value in (("fov", FIELD), ("near", 5e-3 * depth), ("far", 50.0 * depth)):
+        meshcat.SetProperty("/Cameras/default/rotated/<object>", name, value)
 
 
 def _size(robot: Robot) -> float:
