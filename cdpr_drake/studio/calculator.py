@@ -26,10 +26,6 @@ class Calculator:
         """Does some work, whoever may wait for it."""
         return self._executor.submit(work)
 
-    async def result(self, work: Callable[[], T]) -> T:
-        """What some work returns."""
-        return await asyncio.wrap_future(self.submit(work))
-
     def run(self, work: Callable[[], T], done: Callable[[Future[T]], Any] | None = None) -> None:
         """Does some work, and calls `done` with its future in the caller's event loop.
 

@@ -154,5 +154,5 @@ class LiveWorkspace:
     async def refine(self, rest: float = 0.0) -> None:
         """Draws a finer workspace of the robot after a rest [s], unless it changes meanwhile."""
         await asyncio.sleep(rest)
-        await self._calculator.result(lambda: self.draw(FINE))
+        await asyncio.wrap_future(self._calculator.submit(lambda: self.draw(FINE)))
         self.take()

@@ -10,9 +10,9 @@ import numpy as np
 from cdpr_drake.studio.workbench.side_by_side import Pair
 
 
-def number_words(value: float | None, digits: int = 4) -> str:
-    """A number with so many digits; a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+def number_words(value: float | None, digits: int = 4, kind: str = "g") -> str:
+    """A number with so many digits, or decimals if its kind is f; a dash where there is none."""
+    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}{kind}}"
 
 
 def fact_rows(facts: Iterable[Sequence[str]]) -> str:

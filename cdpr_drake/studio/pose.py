@@ -61,7 +61,7 @@ def pose_panel(bench: Workbench) -> None:
         waiting.set_visibility(answer is None and bench.problem is None)
         problem.text = "" if bench.problem is None else message(bench.problem)
         if method.options != (options := _methods(bench)):
-            method.set_options(options)
+            method.set_options(options, value=bench.method)
         method.value = bench.method
         reference.set_visibility(METHODS[bench.method].needs_reference)
         if answer is not None:
@@ -187,10 +187,11 @@ def _cable_table(answer: PoseAnswer) -> str:
         for bound in (low, high)
         if 0.0 < bound <= scale
     )
+    none = np.full(len(robot.cables), np.nan)
     columns = {
-        "length [m]": (answer.lengths, 4),
-        "at rest [N]": (None if rest is None else rest.tensions, 2),
-        "unstrained [m]": (None if rest is None else rest.l0, 4),
+        "length [m]": (none if answer.lengths is None else answer.lengths, 4),
+        "at rest [N]": (none if rest is None else rest.tensions, 2),
+        "unstrained [m]": (none if rest is None else rest.l0, 4),
     }
     rows = ""
     for k, (cable, tension) in enumerate(zip(robot.cables, tensions, strict=True)):
@@ -199,29 +200,23 @@ def _cable_table(answer: PoseAnswer) -> str:
         outside = tension < low - 1e-6 * scale or tension > high + 1e-6 * scale
         state = "slack" if is_slack else "out of limits" if outside else ""
         width = 100.0 * np.clip(np.nan_to_num(tension) / scale, 0.0, 1.0)
-        cells = "".join(
-            f"<td>{_fixed(None if values is None else values[k], digits)}</td>"
-            for values, digits in columns.values()
-        )
         rows += (
             f"<tr{' class=slack' if state else ''}>"
             f'<th scope="row"><i class="swatch" style="background:{color}"></i>'
             f"{escape(cable.name)}</th>"
             f'<td class="bar"><div><b style="width:{width:.2f}%;'
             f'background:{SLACK if is_slack else color}"></b>{ticks}</div></td>'
-            f'<td>{_fixed(tension, 2)}</td><td class="mark">{state}</td>{cells}</tr>'
+            f'<td>{number_words(tension, 2, "f")}</td><td class="mark">{state}</td>'
         )
+        for values, digits in columns.values():
+            rows += f"<td>{number_words(values[k], digits, 'f')}</td>"
+        rows += "</tr>"
     heads = "".join(f"<th>{head}</th>" for head in ("cable", "tension", "[N]", "state", *columns))
     beyond = "" if high <= scale else f"; {high:g} N is beyond the scale"
     return (
         f'<table class="studio-cables"><caption>tensions, limits {low:g} to {high:g} N{beyond}'
         f"</caption><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
     )
-
-
-def _fixed(value: float | None, digits: int) -> str:
-    """A number with so many decimals, a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}f}"
 
 
 def bar_scale(values: Array, upper: float) -> float:

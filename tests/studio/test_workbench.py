@@ -9,6 +9,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
 from cdpr_drake.studio.calculator import Calculator
+from cdpr_drake.studio.pose import answer_html
 from cdpr_drake.studio.pose_answer import PoseCoordinates, RobotQuestions
 from cdpr_drake.studio.scene import EXITS
 from cdpr_drake.studio.session import Workbench
@@ -72,6 +73,9 @@ def test_the_numbers_are_those_of_the_commands(bench, tmp_path, capsys):
             main([command, str(tmp_path / "mine.yaml"), "--pose=0.1,-0.05,0.3,5,-3,10", "--json"])
         answers[command] = json.loads(capsys.readouterr().out)
     assert bench.answer.tensions.tolist() == answers["tension"]["tensions_n"]
+    html = answer_html(bench.answer, bench.command_name)
+    assert all(f"</div></td><td>{tension:.2f}</td>" in html for tension in bench.answer.tensions)
+    assert "cdpr tension mine.yaml --pose=0.1,-0.05,0.3,5,-3,10 --method=" in html
     assert bench.answer.rest.tensions.tolist() == answers["static"]["tensions_n"]
     assert bench.answer.rest.frequencies.tolist() == answers["static"]["frequencies_hz"]
 
