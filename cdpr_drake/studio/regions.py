@@ -160,18 +160,16 @@ def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rg
 def _box_layers(folder: Path, finished: bool) -> list[Layer]:
     """Boxes by what is proven of them."""
     boxes = load_boxes(folder, finished)
-    shares = {"inside": boxes.inside, "outside": boxes.outside, "open": boxes.open}
-    words = {"inside": "proven inside", "outside": "proven outside", "open": "nothing is proven"}
     sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
     # Boxes of several orientations lie upon each other: what they fill is no volume of positions.
     whole = None if np.any(sizes[3:] > 0.0) else float(np.prod(sizes[:3]))
-    return [
-        Layer(
-            f"boxes {name}", f"{words[name]}, {count}",
-            None if whole is None else shares[name] * whole, "m^3", shares[name], solid, color,
-        )
-        for name, count, solid, color in box_solids(boxes)
-    ]  # fmt: skip
+    layers = []
+    for name, count, solid, color in box_solids(boxes):
+        share = float(getattr(boxes, name))
+        volume = None if whole is None else share * whole
+        title = f"{'nothing is proven' if name == 'open' else f'proven {name}'}, {count}"
+        layers.append(Layer(f"boxes {name}", title, volume, "m^3", share, solid, color))
+    return layers
 
 
 def show_regions(meshcat: Meshcat, regions: Regions | None, visible: set[str]) -> None:

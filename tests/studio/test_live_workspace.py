@@ -155,9 +155,9 @@ def test_the_scene_comes_before_the_page(alone, monkeypatch):
     assert order == ["scene", "size", "numbers"]
 
 
-@pytest.mark.parametrize("late", [0.01, 1e3])
+@pytest.mark.parametrize(("late", "p_W"), [(0.01, THERE), (1e3, FARTHER)])
 async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are_late(
-    held, user, monkeypatch, late
+    held, user, monkeypatch, late, p_W
 ):
     monkeypatch.setattr(sessions, "LATE", late)
     bench, said, held_up = held.bench, [], threading.Event()
@@ -167,7 +167,7 @@ async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are
     with user:
         signs = list(ElementFilter(marker="busy"))
     try:
-        drag(bench, THERE)
+        drag(bench, p_W)
         assert not any(sign.visible for sign in signs)  # it would flicker in the hand
         bench.move_to(bench.coordinates)
         assert [sign.visible for sign in signs] == [True, True]

@@ -1,6 +1,7 @@
 """Documents, folder and poses of a workbench, without a page."""
 
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.pose import answer_html
 from cdpr_drake.studio.pose_answer import PoseCoordinates, RobotQuestions
-from cdpr_drake.studio.scene import EXITS
+from cdpr_drake.studio.scene import EXITS, R_EW, look_at_robot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
@@ -19,6 +20,9 @@ from tests.models.formats.foreign_files import caspr
 
 ROUNDING = 1e-9
 """Of coordinates, there and back [m, deg]."""
+
+APART = 2.0 / 300.0
+"""Exit points are at least so far apart, of half a window: about 2 px."""
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +103,31 @@ def test_coordinates_of_every_robot_go_there_and_back(name):
     assert coordinates.pose(values).IsNearlyEqualTo(home, ROUNDING)
     moved = [value + 0.1 for value in values]
     np.testing.assert_allclose(coordinates.values(coordinates.pose(moved)), moved, atol=ROUNDING)
+
+
+class Eye:
+    """In place of Meshcat: where it is told to look from."""
+
+    def SetCameraPose(self, p_WE, p_WT):
+        self.p_WE, self.p_WT = p_WE, p_WT
+
+    def SetProperty(self, path, name, value):
+        setattr(self, name, value)
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_the_scene_shows_all_of_a_robot_whatever_its_size(name):
+    robot, eye = load_robot(name), Eye()
+    look_at_robot(eye, robot)
+    exits = np.unique(robot.cable_set().p_WA.T, axis=0)
+    frame = np.array(list(product(*zip(robot.frame.lower, robot.frame.upper, strict=True))))
+    p = (np.concatenate([exits, frame]) - eye.p_WE) @ R_EW.T
+    seen = -p[:, :2] / p[:, 2:] / np.tan(np.radians(eye.fov / 2.0))
+    sizes = np.max(np.abs(seen), axis=0) / (1.25, 1.0)  # the window is wider than high
+    assert 0.85 < np.max(sizes) < 0.95
+    assert eye.near < np.min(-p[:, 2]) < np.max(-p[:, 2]) < eye.far
+    apart = np.linalg.norm(seen[: len(exits), np.newaxis] - seen[: len(exits)], axis=2)
+    assert np.min(apart + 10.0 * np.eye(len(exits))) > APART
 
 
 def test_the_scene_follows_the_robot(bench):
