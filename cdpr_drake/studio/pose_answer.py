@@ -170,26 +170,23 @@ class PoseCoordinates:
     def __init__(self, robot: Robot) -> None:
         """Of a robot; what it cannot change is as at its home pose."""
         self._joint, self._home = robot.joint(), robot.home.transform()
-        joint, motion = self._joint, robot.motion_type()
-        moves, turns = motion.num_moves, 0 if joint.is_line else motion.num_turns
-        home = robot.home.position  # may lie outside a frame that was assumed
-        lower, upper = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
-        if joint.is_floating:
-            first_turn, where, words = 3, "W", "R = Rx(φ) Ry(θ) Rz(ψ)"
-        else:
-            corners = np.array(list(product(*zip(lower, upper, strict=True)))).T
-            corners = joint.X_WF.inverse().multiply(corners)
-            lower, upper = corners.min(axis=1), corners.max(axis=1)
-            first_turn, words = 2, "turn about the plane's normal"
-            place = "the plane" if motion.is_plane else "the line"
-            where = "W" if joint.is_as_world() else place
-        names = "φθψ"[:turns] if joint.is_floating else "ψ" * turns
-        self._changed = [*range(moves), *range(first_turn, first_turn + turns)]
+        motion, home = robot.motion_type(), robot.home.position
+        # Home may lie outside a frame that was assumed.
+        box = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
+        corners = np.array(list(product(*zip(*box, strict=True)))).T
+        corners = self._joint.X_WF.inverse().multiply(corners)
+        first, names, words = 2, "ψ", "turn about the plane's normal"
+        if self._joint.is_floating:
+            first, names, words = 3, "φθψ", "R = Rx(φ) Ry(θ) Rz(ψ)"
+        place = "the plane" if motion.is_plane else "the line"
+        place = "W" if self._joint.is_as_world() else place
+        moves, turns = motion.num_moves, motion.num_turns
+        self._changed = [*range(moves), *range(first, first + turns)]
         self._units = np.array([1.0] * moves + [np.pi / 180.0] * turns)
         self.axes = [
-            *(PoseAxis(name, f"{name} of Po in {where}", "m", float(lower[k]), float(upper[k]))
-              for k, name in enumerate("xyz"[:moves])),
-            *(PoseAxis(name, words, "deg", -180.0, 180.0) for name in names),
+            *(PoseAxis(name, f"{name} of Po in {place}", "m", float(min(row)), float(max(row)))
+              for name, row in zip("xyz"[:moves], corners, strict=False)),
+            *(PoseAxis(name, words, "deg", -180.0, 180.0) for name in names[:turns]),
         ]  # fmt: skip
 
     def values(self, X_WP: RigidTransform) -> list[float]:
