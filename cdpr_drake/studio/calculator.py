@@ -26,10 +26,6 @@ class Calculator:
         """Does some work, whoever may wait for it."""
         return self._executor.submit(work)
 
-    async def result(self, work: Callable[[], T]) -> T:
-        """What some work returns."""
-        return await asyncio.wrap_future(self.submit(work))
-
     def run(self, work: Callable[[], T], done: Callable[[Future[T]], Any] | None = None) -> None:
         """Does some work, and calls `done` with its future in the caller's event loop.
 
@@ -55,7 +51,44 @@ class Calculator:
         self._executor.shutdown(wait=True, cancel_futures=True)
 
 
-Listener = Callable[[], None]
+class Latest:
+    """Of questions that come faster than answers, the newest; those before it are dropped.
+
+    Attributes:
+        is_busy: True from a question to the answer of the newest one.
+    """
+
+    def __init__(self, calculator: Calculator, tell: Callable[[Future[Any]], None]) -> None:
+        """Asks a calculator; `tell` gets each answer in the event loop of who asked."""
+        self._calculator, self._tell = calculator, tell
+        self._question: Callable[[], Any] | None = None
+        self.is_busy = False
+
+    def ask(self, question: Callable[[], Any]) -> None:
+        """Asks at once, or after the question that is being answered."""
+        self._question = question
+        if not self.is_busy:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        question, self._question = self._question, None
+        self.is_busy = question is not None
+        if question is not None:
+            self._calculator.run(question, self._answered)
+
+    def _answered(self, future: Future[Any]) -> None:
+        self._go_on()
+        self._tell(future)
+
+
+def later(seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle | None:
+    """Calls something after a time [s]; without an event loop at once."""
+    try:
+        loop = asyncio.get_running_loop()
+    except RuntimeError:
+        call()
+        return None
+    return loop.call_later(seconds, call)
 
 
 class Signal:
@@ -63,17 +96,13 @@ class Signal:
 
     def __init__(self) -> None:
         """Without any."""
-        self._listeners: dict[object, Listener] = {}
+        self._listeners: dict[object, Callable[[], None]] = {}
 
-    def connect(self, listener: Listener) -> Callable[[], None]:
+    def connect(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Calls `listener` from now on; what is returned ends that, also when called twice."""
         key = object()
         self._listeners[key] = listener
-
-        def disconnect() -> None:
-            self._listeners.pop(key, None)
-
-        return disconnect
+        return lambda: self._listeners.pop(key, None) and None
 
     def emit(self) -> None:
         """Calls all of them, in the order in which they came."""

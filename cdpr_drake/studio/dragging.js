@@ -4,7 +4,7 @@
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
-  const NEAR = 14, PERIOD = 50, SLOW = 40, COARSE = 0.5, FORGIVEN = 0.02, BURST = 8;
+  const NEAR = 14, SAME = 2, PERIOD = 50, SLOW = 40, COARSE = 0.5, FORGIVEN = 0.02, BURST = 8;
   const times = (M, v) => [0, 1, 2, 3].map(
     (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
   const frame = () => document.getElementById('scene');
@@ -88,14 +88,16 @@
     const viewer = w.viewer, canvas = viewer.renderer.domElement;
     if (canvas.studioListens) return;
     canvas.studioListens = true;
+    // The point that is nearest to the pointer; of points at one place there, that in front.
     const under = (event) => {
       let best = null;
       for (const point of points(viewer)) {
         const s = onScreen(viewer, point.place);
-        const off = Math.hypot(s.x - event.offsetX, s.y - event.offsetY);
-        if (off < NEAR && s.depth < 1 && (!best || s.depth < best.depth - 1e-4
-            || (Math.abs(s.depth - best.depth) <= 1e-4 && off < best.off)))
-          best = {...point, depth: s.depth, off, dx: s.x - event.offsetX, dy: s.y - event.offsetY};
+        const dx = s.x - event.offsetX, dy = s.y - event.offsetY, off = Math.hypot(dx, dy);
+        if (off >= NEAR || s.depth >= 1) continue;
+        const apart = best ? Math.hypot(dx - best.dx, dy - best.dy) : NEAR;
+        if (!best || (apart < SAME ? s.depth < best.depth : off < best.off))
+          best = {...point, depth: s.depth, off, dx, dy};
       }
       return best;
     };

@@ -7,12 +7,12 @@ that is one change of the document.
 from __future__ import annotations
 
 from importlib.resources import files
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from nicegui import events, ui
+from pydantic import BaseModel, FiniteFloat, ValidationError
 
-from cdpr_drake.arrays import Array
 from cdpr_drake.studio.live_workspace import LiveWorkspace
 from cdpr_drake.studio.panel import notify, on_page, show_errors
 from cdpr_drake.studio.pose_answer import PoseAnswer
@@ -30,37 +30,34 @@ EMPTY = (
 HIDDEN = "The static workspace is not drawn while values change."
 
 
+class _Moved(BaseModel):
+    """What the script says: which point, its number, p_W [m], and whether it was let go."""
+
+    kind: Literal["exit", "anchor"]
+    number: int
+    at: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    done: bool = False
+
+
 def add_point_dragging(bench: Workbench) -> None:
     """Lets the points in the page's scene be dragged."""
 
     def moved(event: events.GenericEventArguments) -> None:
         with show_errors():
-            point = _point(event.args, len(bench.robot.value.cables))
-            words = bench.drag_point(*point) if point else ""
-            if words:
-                notify(words)
+            try:
+                point = _Moved.model_validate(event.args)
+            except ValidationError:
+                return  # the script says no such thing
+            if 0 <= point.number < len(bench.robot.value.cables):
+                words = bench.drag_point(point.kind, point.number, np.array(point.at), point.done)
+                if words:
+                    notify(words)
 
     ui.on(MOVED, moved)
     client = ui.context.client
     client.on_connect(lambda: ui.run_javascript(SCRIPT))
     if client.has_socket_connection:  # the panel is placed after the page has come
         ui.run_javascript(SCRIPT)
-
-
-def _point(message: Any, count: int) -> tuple[str, int, Array, bool] | None:
-    """Kind, number of the cable, p_W [m], and whether it was let go; None for what is no such."""
-    if not isinstance(message, dict):
-        return None
-    kind, number = message.get("kind"), message.get("number")
-    if kind not in ("exit", "anchor") or not isinstance(number, int) or not 0 <= number < count:
-        return None
-    try:
-        p_W = np.array(message.get("at"), float)
-    except (TypeError, ValueError):
-        return None
-    if p_W.shape != (3,) or not np.all(np.isfinite(p_W)):
-        return None
-    return kind, number, p_W, bool(message.get("done"))
 
 
 def busy_sign(bench: Workbench) -> None:
@@ -80,33 +77,27 @@ def live_workspace_bar(bench: Workbench) -> None:
     """Places the switch and the lines of what follows while a point or a value changes."""
     with ui.element("section").classes("studio-live").props('aria-label="What follows changes"'):
         with ui.row().classes("items-center"):
-            switch = ui.switch("Workspace follows", value=bench.live.is_wanted)
-            switch.props("dense").mark("live-workspace")
+            switch = ui.switch("Workspace follows").props("dense").mark("live-workspace")
             busy_sign(bench)
         size = ui.label().classes("studio-soft").mark("live-size")
         pull = ui.label().classes("studio-soft").mark("live-tensions")
 
     def choose() -> None:
-        with show_errors():
-            if switch.value != bench.live.is_wanted:
+        if switch.value != bench.live.is_wanted:
+            with show_errors():
                 bench.live.want(bool(switch.value))
-            say_size()
+            refresh()
 
-    def say_size() -> None:
+    def refresh() -> None:
         switch.value = bench.live.is_wanted
-        size.text = size_words(bench.live)
+        size.text, pull.text = size_words(bench.live), "tensions at this pose: computing"
+        if bench.answer is not None or bench.problem is not None:
+            pull.text = tension_words(bench.answer) if bench.answer is not None else ""
 
-    def say_tensions() -> None:
-        if bench.answer is not None:
-            pull.text = tension_words(bench.answer)
-        else:
-            pull.text = "" if bench.problem else "tensions at this pose: computing"
-
+    refresh()
     switch.on_value_change(choose)
-    say_size()
-    say_tensions()
-    on_page(bench.live.changed, say_size)
-    on_page(bench.answered, say_tensions)
+    on_page(bench.live.changed, refresh)
+    on_page(bench.answered, refresh)
 
 
 def size_words(live: LiveWorkspace) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
@@ -10,17 +10,12 @@ import numpy as np
 from cdpr_drake.studio.workbench.side_by_side import Pair
 
 
-def number_words(value: float | None, digits: int = 4) -> str:
-    """A number with so many digits; a dash where there is none."""
-    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}g}"
+def number_words(value: float | None, digits: int = 4, kind: str = "g") -> str:
+    """A number with so many digits, or decimals if its kind is f; a dash where there is none."""
+    return "–" if value is None or not np.isfinite(value) else f"{value:.{digits}{kind}}"
 
 
-def fact_table(facts: Mapping[str, str]) -> str:
-    """Facts by what they are, in two columns."""
-    return fact_rows(facts.items())
-
-
-def fact_rows(facts: Iterable[tuple[str, str]]) -> str:
+def fact_rows(facts: Iterable[Sequence[str]]) -> str:
     """Facts in two columns; the same name may be there twice."""
     rows = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{escape(words)}</td></tr>'

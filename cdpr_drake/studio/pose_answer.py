@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -18,10 +18,10 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.geometry.poses import angles_from_rotation, pose_from_angles
 from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.studio.results import subject_of
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.statics.robot_at_rest import RobotAtRest
-    from cdpr_drake.analyses.tensions import Tensions
     from cdpr_drake.analyses.workspaces.conditions import PoseConditions
 
 T = TypeVar("T")
@@ -29,62 +29,19 @@ T = TypeVar("T")
 USUAL_METHOD = "quadratic_program"
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PoseAnswer:
-    """A robot at a pose; what cannot be had is None, and a line says why.
+class RobotQuestions:
+    """Answers for one robot at many poses; what does not depend on the pose is computed once.
 
     Attributes:
         robot: The robot.
-        X_WP: The pose.
-        method: Name of the tension distribution method.
-        balance: Answer of `solve_tensions`.
-        why_no_tensions: Why there are no tensions; empty: there are, or `status` says it.
-        rest: Answer of `solve_static`.
-        why_no_rest: Why it is None.
-        lengths: Of the straight paths between exit and anchor points over pulleys, shape (m,) [m].
-        capacity_margin: As `cdpr workspace --measure capacity-margin` [N].
-        why_no_margin: Why it is None; empty: it is not finite, or there is one.
-        clearance: Least distance of cables and platform from what they may meet [m].
-        nearest: What is at that distance, in words.
+        subject: The robot as what results are about.
+        coordinates: Those of its poses.
     """
-
-    robot: Robot
-    X_WP: RigidTransform
-    method: str
-    balance: Tensions | None
-    why_no_tensions: str
-    rest: RobotAtRest | None
-    why_no_rest: str
-    lengths: Array | None
-    capacity_margin: float | None
-    why_no_margin: str
-    clearance: float | None
-    nearest: str
-
-    @property
-    def tensions(self) -> Array:
-        """Tensions as `cdpr tension` prints them, shape (m,) [N]; NaN where there are none."""
-        none = np.full(len(self.robot.cables), np.nan)
-        return none if self.balance is None else self.balance.tensions
-
-    @property
-    def slack(self) -> np.ndarray:
-        """True for cables without tension, shape (m,)."""
-        return np.nan_to_num(self.tensions, nan=1.0) <= 0.0
-
-    @property
-    def status(self) -> str:
-        """Verdict on the tensions; empty without any."""
-        return "" if self.balance is None else self.balance.status
-
-
-class RobotQuestions:
-    """Answers for one robot at many poses; what does not depend on the pose is computed once."""
 
     def __init__(self, robot: Robot) -> None:
         """About a robot; computes nothing yet."""
-        self.robot = robot
-        self.axes = pose_axes(robot)
+        self.robot, self.subject = robot, subject_of(robot)
+        self.coordinates = PoseCoordinates(robot)
 
     @cached_property
     def methods(self) -> list[str]:
@@ -97,7 +54,8 @@ class RobotQuestions:
         return [name for name, method in METHODS.items() if method.takes(redundancy)]
 
     @cached_property
-    def _conditions(self) -> PoseConditions:
+    def conditions(self) -> PoseConditions:
+        """What measures of poses have to know."""
         from cdpr_drake.analyses.workspaces.robot_conditions import pose_conditions
 
         return pose_conditions(self.robot)
@@ -112,48 +70,68 @@ class RobotQuestions:
             method: A name of `tensions.METHODS`.
             reference: Desired tension of all cables [N], for methods that need one.
         """
-        from cdpr_drake.analyses.statics.robot_at_rest import RobotAtRest
+        return PoseAnswer(self, X_WP, method, reference)
+
+
+class PoseAnswer:
+    """A robot at a pose; what cannot be had is None, and a line says why.
+
+    Attributes:
+        robot: The robot.
+        subject: What this is about.
+        X_WP: The pose.
+        method: Name of the tension distribution method.
+        tensions: As `cdpr tension` prints them, shape (m,) [N]; NaN where there are none.
+        slack: True for cables without tension, shape (m,).
+        status: Verdict on the tensions; empty without any.
+        why_no_tensions: Why there are no tensions; empty: there are, or `status` says it.
+        rest: Answer of `solve_static`.
+        why_no_rest: Why it is None.
+        lengths: Of the straight paths between exit and anchor points over pulleys, shape (m,) [m].
+        capacity_margin: As `cdpr workspace --measure capacity-margin` [N].
+        why_no_margin: Why it is None; empty: it is not finite, or there is one.
+        clearance: Least distance of cables and platform from what they may meet [m].
+        nearest: What is at that distance, in words.
+    """
+
+    def __init__(
+        self, about: RobotQuestions, X_WP: RigidTransform, method: str, reference: float | None
+    ) -> None:
+        """Computes it; arguments as of `RobotQuestions.at`."""
         from cdpr_drake.analyses.statics.static import solve_static
         from cdpr_drake.analyses.tensions import solve_tensions
+        from cdpr_drake.analyses.workspaces.conditions import MEASURES, Poses
         from cdpr_drake.geometry.cable_paths import cable_paths
+        from cdpr_drake.workspaces.cable_interference import PART_NAMES, clearances
 
-        robot = self.robot
-        method = USUAL_METHOD if robot.is_underactuated() else method
-        balance, why_no_tensions = _or_refusal(
-            lambda: solve_tensions(robot, X_WP, method=method, reference=reference)
+        robot = self.robot = about.robot
+        self.subject, self.X_WP = about.subject.at(X_WP), X_WP
+        self.method = USUAL_METHOD if robot.is_underactuated() else method
+        balance, self.why_no_tensions = _or_refusal(
+            lambda: solve_tensions(robot, X_WP, method=self.method, reference=reference)
         )
-        if balance is not None and balance.control is not None and np.isnan(balance.tensions[0]):
-            why_no_tensions = "; ".join(
+        self.status = "" if balance is None else balance.status
+        self.tensions = np.full(len(robot.cables), np.nan) if balance is None else balance.tensions
+        self.slack: np.ndarray = np.nan_to_num(self.tensions, nan=1.0) <= 0.0
+        if balance is not None and balance.control is not None and np.isnan(self.tensions[0]):
+            self.why_no_tensions = "; ".join(
                 f"nothing balances {row['combination']}, {row['unbalanced']:.4g}"
                 for row in balance.uncontrolled()
             )
-        rest, why_no_rest = _or_refusal(lambda: solve_static(robot, X_WP))
-        lengths, _ = _or_refusal(lambda: cable_paths(X_WP, robot.cable_set()).lengths)
-        gap, _ = _or_refusal(lambda: self._clearance(X_WP))
-        margin, why_no_margin = _or_refusal(lambda: self._capacity_margin(X_WP))
-        return PoseAnswer(
-            robot=robot, X_WP=X_WP, method=method, balance=balance,
-            why_no_tensions=why_no_tensions, rest=rest if isinstance(rest, RobotAtRest) else None,
-            why_no_rest=why_no_rest, lengths=lengths, why_no_margin=why_no_margin,
-            capacity_margin=margin if margin is not None and np.isfinite(margin) else None,
-            clearance=gap[0] if gap else None, nearest=gap[1] if gap else "",
-        )  # fmt: skip
-
-    def _clearance(self, X_WP: RigidTransform) -> tuple[float, str] | None:
-        """Least distance [m] and what is there; None: there is nothing to meet."""
-        from cdpr_drake.workspaces.cable_interference import PART_NAMES, clearances
-
-        gaps = clearances(self._conditions.around, *_stacked(X_WP))[0]
-        if np.all(np.isnan(gaps)):
-            return None
-        nearest = int(np.nanargmin(gaps))
-        return float(gaps[nearest]), PART_NAMES[nearest]
-
-    def _capacity_margin(self, X_WP: RigidTransform) -> float:
-        from cdpr_drake.analyses.workspaces.conditions import MEASURES, Poses
-
-        poses = Poses(0, 1, *_stacked(X_WP))
-        return float(MEASURES["capacity-margin"].value(self._conditions, poses)[0])
+        self.rest, self.why_no_rest = _or_refusal(
+            lambda: cast("RobotAtRest", solve_static(robot, X_WP))
+        )
+        self.lengths, _ = _or_refusal(lambda: cable_paths(X_WP, robot.cable_set()).lengths)
+        place = X_WP.translation()[np.newaxis], X_WP.rotation().matrix()[np.newaxis]
+        margin, self.why_no_margin = _or_refusal(
+            lambda: MEASURES["capacity-margin"].value(about.conditions, Poses(0, 1, *place))[0]
+        )
+        self.capacity_margin = _finite(margin)
+        gaps, _ = _or_refusal(lambda: clearances(about.conditions.around, *place)[0])
+        gaps = np.array([np.nan]) if gaps is None else gaps
+        nearest = int(np.argmin(np.nan_to_num(gaps, nan=np.inf)))
+        self.clearance = _finite(gaps[nearest])
+        self.nearest = "" if self.clearance is None else PART_NAMES[nearest]
 
 
 def _or_refusal(question: Callable[[], T]) -> tuple[T | None, str]:
@@ -164,9 +142,8 @@ def _or_refusal(question: Callable[[], T]) -> tuple[T | None, str]:
         return None, str(refusal)
 
 
-def _stacked(X_WP: RigidTransform) -> tuple[Array, Array]:
-    """Position, shape (1, 3) [m], and rotation, shape (1, 3, 3)."""
-    return X_WP.translation()[np.newaxis], X_WP.rotation().matrix()[np.newaxis]
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)
 
 
 @dataclass(frozen=True)
@@ -180,54 +157,51 @@ class PoseAxis:
     upper: float
 
 
-def pose_axes(robot: Robot) -> list[PoseAxis]:
-    """The coordinates that a robot's platform can change, within the frame.
+class PoseCoordinates:
+    """The coordinates that a robot's platform can change, in the order of their axes.
 
     Of a body in space position and angles, R = Rx(φ) Ry(θ) Rz(ψ); of a platform in a plane or on a
     line, the coordinates of its joint, along the plane's axes.
+
+    Attributes:
+        axes: What each is, within the frame.
     """
-    home = robot.home.position  # may lie outside a frame that was assumed
-    lower, upper = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
-    joint, motion = robot.joint(), robot.motion_type()
-    where = "W" if joint.is_as_world() else "the plane" if motion.is_plane else "the line"
-    turns = [("ψ", "turn about the plane's normal")] * motion.num_turns
-    if joint.is_floating:
-        where = "W"
-        turns = [(name, "R = Rx(φ) Ry(θ) Rz(ψ)") for name in "φθψ"[: motion.num_turns]]
-    else:
-        corners = np.array(list(product(*zip(lower, upper, strict=True)))).T
-        corners = joint.X_WF.inverse().multiply(corners)
-        lower, upper = corners.min(axis=1), corners.max(axis=1)
-    moves = zip("xyz"[: motion.num_moves], lower, upper, strict=False)
-    return [
-        *(PoseAxis(name, f"{name} of Po in {where}", "m", float(a), float(b))
-          for name, a, b in moves),
-        *(PoseAxis(name, words, "deg", -180.0, 180.0) for name, words in turns),
-    ]  # fmt: skip
 
+    def __init__(self, robot: Robot) -> None:
+        """Of a robot; what it cannot change is as at its home pose."""
+        self._joint, self._home = robot.joint(), robot.home.transform()
+        motion, home = robot.motion_type(), robot.home.position
+        # Home may lie outside a frame that was assumed.
+        box = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
+        corners = np.array(list(product(*zip(*box, strict=True)))).T
+        corners = self._joint.X_WF.inverse().multiply(corners)
+        first, names, words = 2, "ψ", "turn about the plane's normal"
+        if self._joint.is_floating:
+            first, names, words = 3, "φθψ", "R = Rx(φ) Ry(θ) Rz(ψ)"
+        place = "the plane" if motion.is_plane else "the line"
+        place = "W" if self._joint.is_as_world() else place
+        moves, turns = motion.num_moves, motion.num_turns
+        self._changed = [*range(moves), *range(first, first + turns)]
+        self._units = np.array([1.0] * moves + [np.pi / 180.0] * turns)
+        self.axes = [
+            *(PoseAxis(name, f"{name} of Po in {place}", "m", float(min(row)), float(max(row)))
+              for name, row in zip("xyz"[:moves], corners, strict=False)),
+            *(PoseAxis(name, words, "deg", -180.0, 180.0) for name in names[:turns]),
+        ]  # fmt: skip
 
-def axis_values(robot: Robot, X_WP: RigidTransform) -> list[float]:
-    """The coordinates of a pose [m, deg], in the order of `pose_axes`."""
-    joint, motion = robot.joint(), robot.motion_type()
-    if joint.is_floating:
-        moves, turns = X_WP.translation(), angles_from_rotation(X_WP.rotation())
-    else:
-        moves, turns = np.split(joint.coordinates(X_WP), [2])
-    values = *moves[: motion.num_moves], *np.degrees(turns[: motion.num_turns])
-    return [float(value) for value in values]
+    def values(self, X_WP: RigidTransform) -> list[float]:
+        """The coordinates of a pose [m, deg]."""
+        values = self._all(X_WP)[self._changed] / self._units
+        return [float(value) for value in values]
 
+    def pose(self, values: Sequence[float]) -> RigidTransform:
+        """The pose with such coordinates [m, deg]."""
+        q = self._all(self._home)
+        q[self._changed] = values * self._units
+        return pose_from_angles(q[:3], q[3:]) if self._joint.is_floating else self._joint.pose_at(q)
 
-def pose_at(robot: Robot, values: Sequence[float]) -> RigidTransform:
-    """The pose with coordinates [m, deg] in the order of `pose_axes`."""
-    joint, motion = robot.joint(), robot.motion_type()
-    if joint.is_floating:
-        if not motion.num_turns:
-            return RigidTransform(robot.home.transform().rotation(), np.array(values[:3]))
-        return pose_from_angles(np.array(values[:3]), np.radians(values[3:6]))
-    q = np.zeros(3)
-    q[: motion.num_moves] = values[: motion.num_moves]
-    if motion.num_turns:
-        q[2] = np.radians(values[motion.num_moves])
-    elif not joint.is_line:
-        q[2] = joint.coordinates(robot.home.transform())[2]
-    return joint.pose_at(q)
+    def _all(self, X_WP: RigidTransform) -> Array:
+        """All coordinates of the joint [m, rad]; of a body in space position and angles."""
+        if self._joint.is_floating:
+            return np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
+        return self._joint.coordinates(X_WP)

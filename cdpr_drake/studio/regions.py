@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.proofs.box_figures import box_solids
 from cdpr_drake.proofs.certified_workspace import load_boxes
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 from cdpr_drake.workspaces.volume import WorkspaceVolume
 
 REGIONS, PLANE = "workspaces", "workspaces/plane"
@@ -113,36 +115,41 @@ def read_regions(folder: Path) -> Regions:
         of_stability = isinstance(summary["workspaces"], list)
     except (OSError, ValueError, KeyError, TypeError) as problem:
         raise CdprError(f"{folder.name}: {RESULTS} cannot be read: {problem}") from problem
-    values: dict[str, Array] = {}
-    if of_stability:
-        stability = load_stability(folder)
-        axes, units = stability.grid.axes, dict[str, str]()
-        layers = [
-            _layer(
-                f"{bounds} {kind}",
-                STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}"),
-                stability.volume(kind, bounds=bounds), solid, color,
-            )
-            for bounds, kind, solid, color in stability_solids(stability)
-        ]  # fmt: skip
-        for name, margin in zip(stability.names, stability.margin, strict=True):
-            values[f"margin, bounds {name}"], units[f"margin, bounds {name}"] = margin, "-"
-    else:
-        workspace = load_workspace(folder)
-        axes, units = workspace.grid.axes, {name: MEASURES[name].unit for name in workspace.values}
-        layers = [
-            _layer(name, summary["workspaces"][name]["title"], workspace.volume(name), solid, color)
-            for name, solid, color in workspace_solids(workspace)
-        ]
-        values = workspace.values
-        if "hull" in summary:
-            hull = load_hull(folder)
-            title = "what is seen of it from a centre, by rays"
-            layers.append(Layer("hull", title, hull.volume, "m^3", None, *hull_solid(hull)))
-        if "certified" in summary:
-            layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+    grid, layers, values, units = (_of_stability if of_stability else _of_kinds)(folder, summary)
     least = {name: np.asarray(np.min(each, axis=0), float) for name, each in values.items()}
-    return Regions(folder, str(summary["robot"]), axes, tuple(layers), least, units)
+    return Regions(folder, str(summary["robot"]), grid.axes, tuple(layers), least, units)
+
+
+_Parts = tuple[WorkspaceGrid, list[Layer], Mapping[str, Array], dict[str, str]]
+"""Grid, layers, values at its poses by name, and their units."""
+
+
+def _of_stability(folder: Path, summary: Mapping[str, Any]) -> _Parts:
+    stability = load_stability(folder)
+    layers = []
+    for bounds, kind, solid, color in stability_solids(stability):
+        title = STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}")
+        volume = stability.volume(kind, bounds=bounds)
+        layers.append(_layer(f"{bounds} {kind}", title, volume, solid, color))
+    names = [f"margin, bounds {name}" for name in stability.names]
+    values = dict(zip(names, stability.margin, strict=True))
+    return stability.grid, layers, values, dict.fromkeys(names, "-")
+
+
+def _of_kinds(folder: Path, summary: Mapping[str, Any]) -> _Parts:
+    workspace = load_workspace(folder)
+    layers = [
+        _layer(name, summary["workspaces"][name]["title"], workspace.volume(name), solid, color)
+        for name, solid, color in workspace_solids(workspace)
+    ]
+    if "hull" in summary:
+        hull = load_hull(folder)
+        title = "what is seen of it from a centre, by rays"
+        layers.append(Layer("hull", title, hull.volume, "m^3", None, *hull_solid(hull)))
+    if "certified" in summary:
+        layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+    units = {name: MEASURES[name].unit for name in workspace.values}
+    return workspace.grid, layers, workspace.values, units
 
 
 def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rgba) -> Layer:
@@ -153,18 +160,16 @@ def _layer(name: str, title: str, volume: WorkspaceVolume, solid: Any, color: Rg
 def _box_layers(folder: Path, finished: bool) -> list[Layer]:
     """Boxes by what is proven of them."""
     boxes = load_boxes(folder, finished)
-    shares = {"inside": boxes.inside, "outside": boxes.outside, "open": boxes.open}
-    words = {"inside": "proven inside", "outside": "proven outside", "open": "nothing is proven"}
     sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
     # Boxes of several orientations lie upon each other: what they fill is no volume of positions.
     whole = None if np.any(sizes[3:] > 0.0) else float(np.prod(sizes[:3]))
-    return [
-        Layer(
-            f"boxes {name}", f"{words[name]}, {count}",
-            None if whole is None else shares[name] * whole, "m^3", shares[name], solid, color,
-        )
-        for name, count, solid, color in box_solids(boxes)
-    ]  # fmt: skip
+    layers = []
+    for name, count, solid, color in box_solids(boxes):
+        share = float(getattr(boxes, name))
+        volume = None if whole is None else share * whole
+        title = f"{'nothing is proven' if name == 'open' else f'proven {name}'}, {count}"
+        layers.append(Layer(f"boxes {name}", title, volume, "m^3", share, solid, color))
+    return layers
 
 
 def show_regions(meshcat: Meshcat, regions: Regions | None, visible: set[str]) -> None:
@@ -184,17 +189,14 @@ def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
     if plane is None:
         meshcat.Delete(PLANE)
         return
-    u, v = (k for k in range(3) if k != plane.along)
-    axes = regions.axes
-    first, second = np.meshgrid(axes[u], axes[v], indexing="ij")
-    vertices = np.empty((first.size, 3))
-    vertices[:, u], vertices[:, v] = first.ravel(), second.ravel()
-    vertices[:, plane.along] = axes[plane.along][plane.index]
-    values = np.take(regions.values[plane.name], plane.index, plane.along).ravel()
-    corner = np.arange(first.size).reshape(first.shape)
-    a, b = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel()
-    c, d = corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    grid = np.stack(np.meshgrid(*regions.axes, indexing="ij"), axis=-1)
+    points, values = (
+        np.take(each, plane.index, plane.along) for each in (grid, regions.values[plane.name])
+    )
+    corner = np.arange(values.size).reshape(values.shape)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1)
+    faces = quads.reshape(-1, 4)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    vertices, values = points.reshape(-1, 3), values.ravel()
     colors = colors_of(values, regions.range(plane.name))
     meshcat.SetTriangleColorMesh(
         PLANE, np.asfortranarray(vertices.T), np.asfortranarray(faces.T.astype(np.int32)),

@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,14 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Signal
+from cdpr_drake.studio.calculator import Signal, later
 
 FINGERPRINT = 8
 """Digits of a digest that are shown; two of a thousand robots share them about once in 10,000."""
+
+
+CLOCK = 0.02
+"""What an event loop may be early [s]."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,10 @@ class Subject:
     robot: str
     digest: str = ""
     pose: tuple[float, ...] | None = None
+
+    def at(self, X_WP: RigidTransform) -> Subject:
+        """The same robot at a pose."""
+        return dataclasses.replace(self, pose=tuple(float(value) for value in pose_row(X_WP)))
 
     def differs(self, now: Subject) -> str:
         """By what it is about something else than what is open now, in words; empty: it is not."""
@@ -58,15 +67,14 @@ class Subject:
         return self.robot != now.robot or bool(self.digest and self.digest != now.digest)
 
 
-def subject_of(robot: Robot, X_WP: RigidTransform | None = None) -> Subject:
-    """What a result about a robot is about, at a pose if there is one."""
+def subject_of(robot: Robot) -> Subject:
+    """What a result about a robot is about."""
 
     def plain(value: Any) -> Any:
         return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
 
     data = json.dumps(dataclasses.asdict(robot), default=plain, sort_keys=True)
-    pose = None if X_WP is None else tuple(float(value) for value in pose_row(X_WP))
-    return Subject(robot.name, hashlib.sha256(data.encode()).hexdigest(), pose)
+    return Subject(robot.name, hashlib.sha256(data.encode()).hexdigest())
 
 
 class Results:
@@ -79,38 +87,32 @@ class Results:
     def __init__(self, now: Callable[[], Subject]) -> None:
         """Of a workbench; `now` says what is open there."""
         self._now, self.changed = now, Signal()
-        self._shown: dict[str, Subject | None] = {}
-        self._awaited: set[str] = set()
+        self._subjects: dict[str, Subject | None] = {}
+        self._awaited: dict[str, float] = {}  # until when
 
-    def wait_for(self, name: str) -> None:
-        """Says nothing of a result that is about something else: the next one comes at once."""
-        self._awaited.add(name)
+    def wait_for(self, name: str, longest: float) -> None:
+        """Says nothing of a result that is about something else: the next one comes at once.
 
-    def end_wait(self, name: str) -> None:
-        """Says again what a result is about: the next one has come, or does not come soon."""
-        if name in self._awaited:
-            self._awaited.remove(name)
-            self.changed.emit()
+        That holds until it is shown, and at most for so long [s].
+        """
+        self._awaited[name] = monotonic() + longest
+        later(longest + CLOCK, self.changed.emit)
 
     def show(self, name: str, subject: Subject | None) -> None:
         """Says what the result of a name is about from now on; None: there is none any more."""
-        if self._shown.get(name) != subject:
-            self._shown[name] = subject
+        self._awaited.pop(name, None)
+        before, self._subjects[name] = self.subject(name), subject
+        if before != subject:
             self.changed.emit()
 
     def subject(self, name: str) -> Subject | None:
         """What a result is about; None: there is none."""
-        return self._shown.get(name)
+        return self._subjects.get(name)
 
     def differs(self, name: str) -> str:
         """By what a result is about something else than what is open; empty: it is not.
 
         Empty, too, as long as the next result is waited for.
         """
-        subject = self._shown.get(name)
-        return "" if subject is None or name in self._awaited else subject.differs(self._now())
-
-    def is_another(self, name: str) -> bool:
-        """Whether a result is known to be about another robot than the one that is open."""
-        subject = self._shown.get(name)
-        return subject is not None and subject.is_another(self._now())
+        subject, waits = self.subject(name), monotonic() < self._awaited.get(name, 0.0)
+        return "" if subject is None or waits else subject.differs(self._now())

@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba, Sphere
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
 from cdpr_drake.analyses.visualization.replay import RobotPicture
@@ -43,6 +44,18 @@ WORKSPACE_COLOR = Rgba(0.94, 0.76, 0.48, 0.45)
 Solid = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3)."""
 
+R_EW = (
+    RotationMatrix.MakeXRotation(np.radians(-65.0)) @ RotationMatrix.MakeZRotation(np.radians(5.0))
+).matrix()
+"""The eye's axes: right, up, back. It is 25 deg above and 5 deg to the left of the front: there all
+points of the robots of the package lie apart."""
+
+FIELD = 50.0
+"""The eye's angle of view, up [deg]."""
+
+REACH = 0.88 * np.tan(np.radians(FIELD / 2.0)) * np.array([1.25, 1.0])
+"""What a robot fills of it across and up, per distance; `scene.js` has at least that across."""
+
 POINT_SIZE = 0.011
 """Radius of a point, of the diagonal of the frame."""
 
@@ -61,12 +74,9 @@ class RobotScene:
         self.meshcat: Meshcat = open_meshcat()
         self.door = str(private_door(self.meshcat))
         self._robot: Robot | None = None
-        self._name, self._size = "", 0.0
-        self._dark, self._solids = False, ""
-        self._points = (0, 0.0)  # how many there are, and the size that they are made for
         self._picture: RobotPicture | None = None
         self._workspace: Solid | None = None
-        self._keeps_shader = False
+        self._dark, self._solids, self._keeps_shader = False, "", False
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
         """Draws a robot at a pose.
@@ -77,53 +87,47 @@ class RobotScene:
             tensions: Shape (m,) [N]; a slack cable is red, one with NaN grey.
         """
         if robot is not self._robot or self._picture is None:
-            self._place(robot)
-        assert self._picture is not None
+            self._picture = self._place(robot)
         self._picture.draw(X_WP, tensions)
         anchors = X_WP.multiply(robot.cable_set().p_PB)
         for k in range(len(robot.cables)):
             self.meshcat.SetTransform(f"{ANCHORS}/{k}", RigidTransform(anchors[:, k]))
 
-    def _place(self, robot: Robot) -> None:
+    def _place(self, robot: Robot) -> RobotPicture:
         """Puts another robot into the scene, or the same one after a change."""
-        size = float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
-        # Who looks at a point that moves keeps the view.
-        look = robot.name != self._name or abs(size - self._size) > 0.25 * size
+        before, self._robot, picture = self._robot, robot, self._picture
         colors = [nth_look(k).color for k in range(len(robot.cables))]
-        full_scale, solids = robot.tension_limits()[1], _solids(robot)
-        if solids == self._solids and self._picture is not None and not look:
+        full_scale, size, solids = robot.tension_limits()[1], _size(robot), _solids(robot)
+        is_same = picture is not None and solids == self._solids
+        self._solids = solids
+        if picture is not None and is_same:
             # A diagram takes memory that Drake is slow to give back, and the same solids need none.
-            if not self._picture.cables.move_to(robot, full_scale):
+            if not picture.cables.move_to(robot, full_scale):
                 self.meshcat.Delete("cables")
-                self._picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
+                picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
         else:
+            # Who looks at a point that moves keeps the view.
+            look = (
+                before is None or robot.name != before.name
+                or abs(size - _size(before)) > 0.25 * size
+            )  # fmt: skip
             self.meshcat.Delete("cables")
             self.meshcat.Delete("visualizer")
-            self._picture = RobotPicture(
+            picture = RobotPicture(
                 robot, full_scale, meshcat=self.meshcat, colors=colors, look=look
             )
+            if look:
+                look_at_robot(self.meshcat, robot)
             self.set_dark(self._dark)
-            self._points = (0, 0.0)
-        self._solids = solids
-        if self._points != (len(colors), size):
-            self._make_points(colors, size)
+        if before is None or not is_same or len(before.cables) != len(colors):
+            self.meshcat.Delete("studio")  # points that can be dragged; they only move then
+            for k, color in enumerate(colors):
+                for path, share in ((EXITS, 1.0), (ANCHORS, 0.6)):
+                    shape = Sphere(POINT_SIZE * size * share)
+                    self.meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
         for k, p_WA in enumerate(robot.cable_set().p_WA.T):
             self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(p_WA))
-        self._robot, self._name, self._size = robot, robot.name, size
-
-    def _make_points(self, colors: list[str], size: float) -> None:
-        """Makes the points that can be dragged, for a frame of a size [m]; they only move then."""
-        self.meshcat.Delete("studio")
-        for k, color in enumerate(colors):
-            for path in (EXITS, ANCHORS):
-                shape = Sphere(POINT_SIZE * size * (1.0 if path == EXITS else 0.6))
-                self.meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
-        self._points = len(colors), size
-
-    @property
-    def robot(self) -> Robot | None:
-        """The robot that is drawn; None: none yet."""
-        return self._robot
+        return picture
 
     def show_workspace(self, solid: Solid | None) -> None:
         """Draws the workspace that follows the robot, or takes it out."""
@@ -142,13 +146,33 @@ class RobotScene:
     def set_dark(self, dark: bool) -> None:
         """Paints the background for a dark page, or a light one."""
         self._dark = dark
-        top, bottom = BACKGROUNDS[dark]
-        self.meshcat.SetProperty("/Background/<object>", "top_color", top)
-        self.meshcat.SetProperty("/Background/<object>", "bottom_color", bottom)
+        for name, color in zip(("top_color", "bottom_color"), BACKGROUNDS[dark], strict=True):
+            self.meshcat.SetProperty("/Background/<object>", name, color)
 
     def redraw(self) -> None:
         """The next `show` draws everything anew, as after others have drawn into the scene."""
-        self._robot, self._solids, self._workspace = None, "", None
+        self._robot = self._picture = self._workspace = None
+
+
+def look_at_robot(meshcat: Meshcat, robot: Robot) -> None:
+    """Looks at a robot with its frame from the front and above; all of it fills the window."""
+    cables = robot.cable_set()
+    corners = list(product(*zip(robot.frame.lower, robot.frame.upper, strict=True)))
+    anchors = robot.home.transform().multiply(cables.p_PB)
+    p = R_EW @ np.column_stack([np.array(corners).T, cables.p_WA, anchors])
+    # A point is in the window if |p - eye| <= REACH (eye - p)_z, across and up.
+    first, last = (np.max(sign * p[:2].T + REACH * p[2:].T, axis=0) for sign in (-1.0, 1.0))
+    distance = float(np.max((first + last) / (2.0 * REACH)))
+    eye = np.array([*(last - first) / 2.0, distance])
+    depth = distance - float(np.mean([np.min(p[2]), np.max(p[2])]))
+    meshcat.SetCameraPose(R_EW.T @ eye, R_EW.T @ (eye - [0.0, 0.0, depth]))
+    for name, value in (("fov", FIELD), ("near", 5e-3 * depth), ("far", 50.0 * depth)):
+        meshcat.SetProperty("/Cameras/default/rotated/<object>", name, value)
+
+
+def _size(robot: Robot) -> float:
+    """Diagonal of the frame [m]."""
+    return float(np.linalg.norm(robot.frame.upper - robot.frame.lower))
 
 
 def _solids(robot: Robot) -> str:
@@ -182,25 +206,19 @@ class RunScene:
         if isinstance(scenario, Scenario):
             servo = scenario
         else:
-            cables, world = (
-                CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys),
-                scenario.world,
-            )
+            cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
+            world = scenario.world
         self._picture = RobotPicture(
             robot, robot.tension_limits()[1], servo, cables, meshcat=meshcat, world=world,
             colors=[nth_look(k).color for k in range(len(robot.cables))],
         )  # fmt: skip
+        look_at_robot(meshcat, robot)
 
     def draw(self, sample: Mapping[str, Any]) -> None:
         """Draws a sample of the run."""
-        unstrained = sample["unstrained"]
+        pose, tensions = (np.array(sample[name], float) for name in ("pose", "tensions"))
+        unstrained = sample["unstrained"]  # of unknown numbers None becomes NaN
         self._picture.draw(
-            pose_from_row(np.array(sample["pose"], float)),
-            _numbers(sample["tensions"]),
-            float(sample["t"]),
-            None if unstrained is None else _numbers(unstrained),
-        )
-
-
-def _numbers(values: list[float | None]) -> Array:
-    return np.array([np.nan if value is None else value for value in values], float)
+            pose_from_row(pose), tensions, float(sample["t"]),
+            None if unstrained is None else np.array(unstrained, float),
+        )  # fmt: skip

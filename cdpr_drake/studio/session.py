@@ -6,7 +6,6 @@ import asyncio
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,12 +15,12 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
-from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator, Signal
+from cdpr_drake.studio.calculator import Calculator, Latest, Signal, later
 from cdpr_drake.studio.jobs import JobManager
+<<<<<<< HEAD
 from cdpr_drake.studio.live_workspace import LiveWorkspace
 from cdpr_drake.studio.pose_answer import (
     USUAL_METHOD,
@@ -32,6 +31,12 @@ from cdpr_drake.studio.pose_answer import (
 )
 from cdpr_drake.studio.results import Results, Subject, subject_of
 from cdpr_drake.studio.verb_form import Verb
+=======
+from cdpr_drake.studio.live_workspace import COARSE, LiveWorkspace, sketch_workspace
+from cdpr_drake.studio.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
+from cdpr_drake.studio.results import Results, Subject
+from cdpr_drake.studio.workbench.command_form import CommandForm
+>>>>>>> poses-ready
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -62,14 +67,14 @@ class Workbench:
         calculator: The thread for numbers and scenes, that of the server.
         files: Reads robots.
         robot: The robot's document.
-        coordinates: Of the platform's pose, as `pose_axes` has them [m, deg].
+        coordinates: Of the platform's pose, as `PoseCoordinates` has them [m, deg].
         X_WP: The pose.
         method: How tensions are distributed, a name of `tensions.METHODS`.
         reference: Desired tension for methods that need one [N].
         answer: What is known about the robot at a pose; None: nothing yet.
         problem: Why there is no answer, which is a mistake of this program; None: there is one.
-        is_computing: True while the answer is computed.
         answered: Called when there is another answer or problem.
+        is_dragged: True while a point of the robot is in a hand.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
@@ -92,13 +97,16 @@ class Workbench:
         Raises:
             CdprError: There is no such robot, or it is not accepted.
         """
-        self.folder = folder
+        self.folder, self.scenario, self.panel = folder, scenario, ""
         self.calculator = calculator or Calculator()
+        self.jobs = JobManager() if jobs is None else jobs
+        self._make_commands = commands
         where = robot_file(robot).resolve()
         self.files = RobotFiles(folder, where.parent)
         self.robot: Document[Robot] = Document(
             robot_text(robot, "the studio"), where, self.files.read
         )
+        self._shipped = {robot_file(name).resolve(): name for name in robot_names()}
         self._texts: dict[Path, str] = {}  # of robot files
         if where.is_file() and not is_foreign(where):  # of which a name with rails has another text
             self._texts[where] = where.read_text(encoding="utf-8")
@@ -107,23 +115,17 @@ class Workbench:
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
         self.problem: BaseException | None = None
-        self.is_computing = False
         self.answered = Signal()
-        self.scenario, self.panel = scenario, ""
+        self.is_dragged = False
         self.dark: bool | None = None
-        self.jobs = JobManager() if jobs is None else jobs
-        self._make_commands = commands
         self.results = Results(lambda: self.subject)
         self.drawn: Subject | None = None
-        self._busy = self._again = self.is_dragged = False
-        self._answering: asyncio.Task[None] | None = None
+        self._latest = Latest(self.calculator, self._answer_came)
         self._telling: asyncio.TimerHandle | None = None
-        self._scene: RobotScene | None = None
-        self._opened: Future[str] | None = None
         self.live = LiveWorkspace(self.calculator, self.scene)
-        self._take_robot(self.robot.value)
+        self.questions = RobotQuestions(self.robot.value)
         self.go_home()
-        self.robot.changed.connect(self._robot_changed)
+        self.robot.changed.connect(lambda: self._take(self.robot.value))
 
     @cached_property
     def commands(self) -> Mapping[str, Verb]:
@@ -131,10 +133,14 @@ class Workbench:
         return self._make_commands()
 
     @property
+    def is_computing(self) -> bool:
+        """True until what was asked last is answered."""
+        return self._latest.is_busy
+
+    @property
     def subject(self) -> Subject:
         """The robot and the pose that are open: what a result should be about."""
-        pose = tuple(float(value) for value in pose_row(self.X_WP))
-        return replace(self._about, pose=pose)
+        return self.questions.subject.at(self.X_WP)
 
     @property
     def file(self) -> str:
@@ -151,11 +157,7 @@ class Workbench:
     @property
     def command_name(self) -> str:
         """By which commands know the robot as it is, in the folder; empty: they do not."""
-        if not self.is_saved:
-            return ""
-        name = self.robot.value.name
-        shipped = name in robot_names() and self.robot.path == robot_file(name).resolve()
-        return name if shipped else self.file
+        return self._shipped.get(self.robot.path, self.file) if self.is_saved else ""
 
     @property
     def state(self) -> str:
@@ -190,34 +192,40 @@ class Workbench:
         """
         return self.take_upload(self.files.upload(files))
 
-    def take_opened(self, opened: OpenedRobot) -> OpenedRobot:
-        """Works with what `files.open` has read, which another thread may do."""
-        if not opened.notes and opened.path.is_file():
+    def take_opened(self, opened: OpenedRobot, uploaded: bool = False) -> OpenedRobot:
+        """Works with what `files.open`, or `files.upload`, has read, perhaps in another thread."""
+        if uploaded:
+            self._texts.pop(opened.path, None)
+        elif not opened.notes:
             self._texts[opened.path] = opened.text
-        return self._take(opened)
-
-    def take_upload(self, opened: OpenedRobot) -> OpenedRobot:
-        """Works with what `files.upload` has read, which another thread may do."""
-        self._texts.pop(opened.path, None)
-        return self._take(opened)
-
-    def _take(self, opened: OpenedRobot) -> OpenedRobot:
         if opened.notes:
             self._assumed[opened.path] = opened.notes
         self.robot.change(opened.text, opened.path)
         return opened
 
+    def take_upload(self, opened: OpenedRobot) -> OpenedRobot:
+        """Works with what `files.upload` has read."""
+        return self.take_opened(opened, uploaded=True)
+
     def save(self, name: str, overwrite: bool) -> None:
-        """Writes the robot's file into the folder.
+        """Writes the robot's file into the folder, and works with that.
 
         Raises:
             CdprError: The name is not accepted, the file is there already, or cannot be written.
         """
+        self.take_saved(*self.write(name, overwrite))
+
+    def write(self, name: str, overwrite: bool) -> tuple[Path, str]:
+        """Writes the robot's file, perhaps in another thread; its path and text, see `save`."""
         if not name.lower().endswith((".yaml", ".yml")):
             raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
         path, text = self.folder.path(name), self.robot.text
         self.files.read(text, path)  # it may name files that are not there
         self.folder.write(name, text, overwrite or name == self.file)
+        return path, text
+
+    def take_saved(self, path: Path, text: str) -> None:
+        """Works with a file that `write` has written."""
         self._texts[path] = text
         if self.assumed:
             self._assumed[path] = self.assumed
@@ -237,29 +245,24 @@ class Workbench:
         """
         self.is_dragged = not done
         robot = copy.deepcopy(self.robot.value)
-        cable = robot.cables[number]
+        cable, name = robot.cables[number], f"{kind}_point"
         p = cable.base_of(p_W) if kind == "exit" else self.X_WP.inverse().multiply(p_W)
         p = np.round(p, 4) + 0.0
-        if not done:
-            setattr(cable, f"{kind}_point", p)
-            self._take_robot(robot)
-            self.live.follow(robot)
-            self.ask()
-            return ""
-        place = ("cables", number, f"{kind}_point")
         try:
-            self.robot.change(with_value(self.robot.text, place, p.tolist()))
+            if done:
+                place = ("cables", number, name)
+                self.robot.change(with_value(self.robot.text, place, p.tolist()))
+            else:
+                setattr(cable, name, p)
+                self._take(robot)
         except CdprError as problem:
-            self._robot_changed()
+            self._take(self.robot.value)
             return "\n".join(self.robot.words(problem))
         return ""
 
-    def _take_robot(self, robot: Robot) -> None:
-        self.questions, self._about = RobotQuestions(robot), subject_of(robot)
-
-    def _robot_changed(self) -> None:
-        before, robot = self.questions.robot, self.robot.value
-        self._take_robot(robot)
+    def _take(self, robot: Robot) -> None:
+        """Asks about another robot, or the same one after a change."""
+        before, self.questions = self.questions.robot, RobotQuestions(robot)
         self.live.follow(robot if robot.name == before.name else None)
         if robot.name != before.name or robot.motion != before.motion or self._is_outside():
             self.go_home()
@@ -267,96 +270,66 @@ class Workbench:
 
     def _is_outside(self) -> bool:
         """Whether the platform is where the robot as it is now cannot be."""
-        p, (lower, upper) = self.X_WP.translation(), self.robot.value.frame.bounds()
-        near = self.robot.value.joint().nearest(self.X_WP)
-        return bool(
-            np.any(p < lower) or np.any(p > upper) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
-        )
+        robot, p = self.questions.robot, self.X_WP.translation()
+        lower, upper = robot.frame.bounds()
+        near = robot.joint().nearest(self.X_WP)
+        outside = np.any((p < lower) | (p > upper))
+        return bool(outside) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
 
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""
-        self.X_WP: RigidTransform = self.robot.value.home.transform()
-        self.coordinates = axis_values(self.robot.value, self.X_WP)
+        self.X_WP: RigidTransform = self.questions.robot.home.transform()
+        self.coordinates = self.questions.coordinates.values(self.X_WP)
 
     def move_to(self, coordinates: Sequence[float]) -> None:
-        """Moves the platform to coordinates as `pose_axes` has them, and asks about that pose."""
+        """Moves the platform to coordinates, as `PoseCoordinates` has them, and asks there."""
         self.is_dragged = False  # also where a browser went away with a point in its hand
         self.coordinates = [float(value) for value in coordinates]
-        self.X_WP = pose_at(self.robot.value, self.coordinates)
+        self.X_WP = self.questions.coordinates.pose(self.coordinates)
         self.ask()
 
     def ask(self) -> None:
-        """Asks what there is to know; `answered` tells. Of several questions the last counts.
+        """Asks what there is to know, and draws it; `answered` tells, of several the last.
 
         Without an event loop it waits for the answer.
         """
-        self._again = self.is_computing = True
-        self.results.wait_for(POSE_NUMBERS)
+        if not self.is_computing:
+            self.results.wait_for(POSE_NUMBERS, LATE)
+        place = self.X_WP, self.method, self.reference
+        self._latest.ask(partial(self._answer, self.questions, *place))
         self.results.changed.emit()
-        if self._busy:
-            return
-        self._busy = True
-        try:
-            loop = asyncio.get_running_loop()
-        except RuntimeError:
-            asyncio.run(self._answer_all())
-            if self._telling is not None:
-                self._tell()
-        else:
-            self._answering = loop.create_task(self._answer_all())
 
-    async def _answer_all(self) -> None:
-        """Answers until nobody has asked again meanwhile."""
-        loop = asyncio.get_running_loop()
-        try:
-            while self._again:
-                self._again = False
-                late = loop.call_later(LATE, self.results.end_wait, POSE_NUMBERS)
-                try:
-                    await self._answer()
-                finally:
-                    late.cancel()
-        finally:
-            self._busy = self.is_computing = False
-            self.results.end_wait(POSE_NUMBERS)
-
-    async def _answer(self) -> None:
-        """Tells the numbers first and draws then; of what is dragged it draws first."""
-        questions, X_WP = self.questions, self.X_WP
-        at_pose = partial(questions.at, X_WP, self.method, self.reference)
+    def _answer(
+        self, questions: RobotQuestions, X_WP: RigidTransform, method: str, reference: float | None
+    ) -> PoseAnswer:
+        """Answers, and draws the robot in any case; in the calculator's thread."""
         tensions = np.full(len(questions.robot.cables), np.nan)
         try:
-            answer = await self.calculator.result(at_pose)
-            self.answer, self.problem, tensions = answer, None, answer.tensions
-            self.is_computing = self._again
-            self.results.show(POSE_NUMBERS, subject_of(answer.robot, X_WP))
-            if not self.is_dragged:
-                self.answered.emit()
-        except Exception as problem:  # the robot is drawn all the same, with grey cables
-            self.problem = problem
-        try:
-            await self.calculator.result(lambda: self._show(questions.robot, X_WP, tensions))
-        except Exception as problem:
-            self.problem = problem
-        if self.problem is not None:
-            self.is_computing = self._again
-            self.answered.emit()
-        elif not self.is_dragged:
-            self.live.take()
+            answer = questions.at(X_WP, method, reference)
+            tensions = answer.tensions
+        finally:
+            # All is computed before: what comes to the browser at once is one picture, not two.
+            self.live.compute()
+            self.scene().show(questions.robot, X_WP, tensions)
+            self.live.draw()
+        return answer
+
+    def _answer_came(self, future: Future[PoseAnswer]) -> None:
+        self.problem = future.exception()
+        if self.problem is None:
+            if self.answer is None:  # so that kernels are there before somebody drags
+                self.calculator.submit(partial(sketch_workspace, self.robot.value, COARSE))
+            self.answer = future.result()
+            self.results.show(POSE_NUMBERS, self.answer.subject)
+        if self.is_computing:
+            self.results.wait_for(POSE_NUMBERS, LATE)
+        if not self.is_dragged:
+            self._tell()
         elif self._telling is None:
-            self._telling = asyncio.get_running_loop().call_later(TELL, self._tell)
-
-    def _show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
-        """Draws a robot and its workspace; in the calculator's thread.
-
-        All is computed before: what comes to the browser at once is one picture there, not two.
-        """
-        self.live.compute()
-        self.scene().show(robot, X_WP, tensions)
-        self.live.draw(self.scene())
+            self._telling = later(TELL, self._tell)
 
     def _tell(self) -> None:
-        """Tells what there is to know about what is dragged."""
+        """Tells what there is to know, of what is dragged less often than it is drawn."""
         self._telling = None
         self.live.take()
         self.answered.emit()
@@ -373,11 +346,13 @@ class Workbench:
 
     def scene(self) -> RobotScene:
         """The scene, made at the first call; for the calculator's thread only."""
-        if self._scene is None:
-            from cdpr_drake.studio.scene import RobotScene
-
-            self._scene = RobotScene()
         return self._scene
+
+    @cached_property
+    def _scene(self) -> RobotScene:
+        from cdpr_drake.studio.scene import RobotScene
+
+        return RobotScene()
 
     def scene_address(self) -> Future[str]:
         """Path of the socket behind which the scene is; the server relays it to the page.
@@ -385,13 +360,14 @@ class Workbench:
         The robot is drawn there first, with grey cables: what is known of it may have to wait for
         kernels that are compiled.
         """
-        if self._opened is None:
-            robot, X_WP = self.robot.value, self.X_WP
+        return self._address
 
-            def open_scene() -> str:
-                scene = self.scene()
-                scene.show(robot, X_WP, np.full(len(robot.cables), np.nan))
-                return scene.door
+    @cached_property
+    def _address(self) -> Future[str]:
+        robot, X_WP = self.questions.robot, self.X_WP
 
-            self._opened = self.calculator.submit(open_scene)
-        return self._opened
+        def open_scene() -> str:
+            self.scene().show(robot, X_WP, np.full(len(robot.cables), np.nan))
+            return self.scene().door
+
+        return self.calculator.submit(open_scene)

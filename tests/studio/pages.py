@@ -67,7 +67,7 @@ class HeldPage:
         """The robot as it was in the beginning, and nothing that was said."""
         self.user.notify.messages.clear()
         self.bench.open(self._robot)
-        await until(lambda: self.bench.answer is not None and not self.bench._busy)
+        await until(lambda: self.bench.answer is not None and not self.bench.is_computing)
 
     async def _hold(self, folder):
         async with opened_page(folder, self._robot) as (self.user, self.bench, _):

@@ -1,4 +1,4 @@
-"""The static workspace that follows a robot while it is changed."""
+"""The static workspace that follows a robot while it is changed, and points that are dragged."""
 
 import asyncio
 import json
@@ -12,7 +12,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import live_workspace
 from cdpr_drake.studio import session as sessions
-from cdpr_drake.studio.live_workspace import COARSE, FINE, REST, sketch_grid, sketch_workspace
+from cdpr_drake.studio.live_workspace import COARSE, FINE, sketch_grid, sketch_workspace
 from cdpr_drake.studio.scene import SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
@@ -27,12 +27,19 @@ SHARE_OF_COUNT = 0.35
 """By which a grid may have more or fewer poses than it shall: counts of three axes are whole."""
 
 
-@pytest.fixture
-def bench(tmp_path):
-    made = Workbench(WorkingFolder(tmp_path))
-    made.ask()
+@pytest.fixture(scope="module")
+def calculator():
+    made = sessions.Calculator()
     yield made
-    made.calculator.close()
+    made.close()
+
+
+@pytest.fixture
+def alone(tmp_path, calculator):
+    """A workbench without a page."""
+    made = Workbench(WorkingFolder(tmp_path), calculator=calculator)
+    made.ask()
+    return made
 
 
 def in_scene(bench, path=WORKSPACE):
@@ -43,10 +50,10 @@ def drag(bench, p_W, done=False):
     return bench.drag_point("exit", 0, p_W, done=done)
 
 
-def test_a_sketch_is_what_the_command_computes(bench, tmp_path, capsys):
-    drag(bench, THERE, done=True)
-    bench.save("moved.yaml", overwrite=False)
-    sketch = bench.live.sketch
+def test_a_sketch_is_what_the_command_computes(alone, tmp_path, capsys):
+    drag(alone, THERE, done=True)
+    alone.save("moved.yaml", overwrite=False)
+    sketch = alone.live.sketch
     grid = ",".join(str(count) for count in sketch.counts)
     with pytest.raises(SystemExit):
         main(["workspace", str(tmp_path / "moved.yaml"), "--grid", grid, "--json",
@@ -65,67 +72,55 @@ def test_grids_have_about_the_poses_that_are_wanted(name, poses):
     assert np.ptp(steps) < 0.2 * np.max(steps)
 
 
-def test_pieces_make_the_same_as_the_whole():
-    robot = load_robot(ROBOT)
-    (whole,) = sketch_workspace(robot, COARSE)
-    *early, found = sketch_workspace(robot, COARSE, 100)
-    assert early == [None] * ((np.prod(whole.counts) - 1) // 100)
-    assert found.volume == whole.volume
-    np.testing.assert_array_equal(found.solid[0], whole.solid[0])
+def test_it_is_drawn_when_a_point_moves_and_not_before(alone):
+    assert not in_scene(alone)
+    drag(alone, THERE)
+    assert in_scene(alone)
+    coarse = alone.live.sketch
+    assert not alone.live.is_fine
+    drag(alone, FARTHER)
+    assert alone.live.sketch.volume != coarse.volume
+    asyncio.run(alone.live.refine())
+    assert alone.live.is_fine
+    assert np.prod(alone.live.sketch.counts) > 10 * np.prod(coarse.counts)
+    alone.move_to(alone.coordinates)
+    assert alone.live.is_fine  # no robot has changed
+    drag(alone, THERE)
+    assert not alone.live.is_fine
+    assert alone.live.sketch.volume == coarse.volume
+    alone.live.want(False)
+    drag(alone, FARTHER)
+    assert not in_scene(alone)
+    assert in_scene(alone, SHADER)  # which stays compiled
+    alone.live.want(True)
+    assert in_scene(alone)
 
 
-def test_it_is_drawn_when_a_point_moves_and_not_before(bench):
-    assert not in_scene(bench)
-    drag(bench, THERE)
-    assert in_scene(bench)
-    coarse = bench.live.sketch
-    assert not bench.live.is_fine
-    drag(bench, FARTHER)
-    assert bench.live.sketch.volume != coarse.volume
-    asyncio.run(bench.live.refine())
-    assert bench.live.is_fine
-    assert np.prod(bench.live.sketch.counts) > 10 * np.prod(coarse.counts)
-    drag(bench, THERE)
-    assert not bench.live.is_fine
-    assert bench.live.sketch.volume == coarse.volume
-    bench.live.want(False)
-    drag(bench, FARTHER)
-    assert not in_scene(bench)
-    assert in_scene(bench, SHADER)  # which stays compiled
-    bench.live.want(True)
-    assert in_scene(bench)
+def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(alone):
+    drag(alone, THERE, done=True)
+    assert alone.live.sketch.volume == sketch_workspace(alone.robot.value, COARSE).volume
+    alone.calculator.submit(lambda: alone.scene().meshcat.Delete(WORKSPACE)).result()
+    alone.draw(lambda scene: scene.redraw())  # as after others have drawn into the scene
+    alone.ask()
+    assert in_scene(alone)
+    alone.open("acrobot_small")
+    assert not in_scene(alone)
+    assert alone.live.sketch is None
 
 
-def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(bench):
-    drag(bench, THERE, done=True)
-    (whole,) = sketch_workspace(bench.robot.value, COARSE)
-    assert bench.live.sketch.volume == whole.volume
-    bench.calculator.submit(lambda: bench.scene().meshcat.Delete(WORKSPACE)).result()
-    bench.draw(lambda scene: scene.redraw())  # as after others have drawn into the scene
-    bench.ask()
-    assert in_scene(bench)
-    bench.open("acrobot_small")
-    assert not in_scene(bench)
-    assert bench.live.sketch is None
-
-
-def test_a_robot_without_a_static_workspace_says_why(tmp_path):
-    made = Workbench(WorkingFolder(tmp_path), "grab_four")
-    try:
-        made.ask()
-        drag(made, made.robot.value.cable_set().p_WA[:, 0] + 0.01)
-        assert "degrees of freedom" in made.live.problem
-        assert not in_scene(made)
-    finally:
-        made.calculator.close()
+def test_a_robot_without_a_static_workspace_says_why(alone):
+    alone.open("grab_four")
+    drag(alone, alone.robot.value.cable_set().p_WA[:, 0] + 0.01)
+    assert "degrees of freedom" in alone.live.problem
+    assert not in_scene(alone)
 
 
 async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, user, monkeypatch):
     computed, bench = [], held.bench
 
-    def counted(robot, poses, at_once=None):
+    def counted(robot, poses):
         computed.append((poses, robot.cables[0].exit_point[0]))
-        return sketch_workspace(robot, poses, at_once)
+        return sketch_workspace(robot, poses)
 
     monkeypatch.setattr(live_workspace, "sketch_workspace", counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
@@ -146,7 +141,7 @@ async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, 
     await until(lambda: "refined" in field(user, "live-size").text)
 
 
-def test_while_a_point_is_dragged_the_scene_comes_before_the_page(bench, monkeypatch):
+def test_the_scene_comes_before_the_page(alone, monkeypatch):
     order, show_workspace = [], RobotScene.show_workspace
 
     def shown(scene, solid):
@@ -154,18 +149,15 @@ def test_while_a_point_is_dragged_the_scene_comes_before_the_page(bench, monkeyp
         order.append("scene")
 
     monkeypatch.setattr(RobotScene, "show_workspace", shown)
-    bench.answered.connect(lambda: order.append("numbers"))
-    bench.live.changed.connect(lambda: order.append("size"))
-    drag(bench, THERE)
+    alone.answered.connect(lambda: order.append("numbers"))
+    alone.live.changed.connect(lambda: order.append("size"))
+    drag(alone, THERE)
     assert order == ["scene", "size", "numbers"]
-    order.clear()
-    drag(bench, FARTHER, done=True)
-    assert order[0] == "numbers"
 
 
-@pytest.mark.parametrize("late", [0.01, 1e3])
+@pytest.mark.parametrize(("late", "p_W"), [(0.01, THERE), (1e3, FARTHER)])
 async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are_late(
-    held, user, monkeypatch, late
+    held, user, monkeypatch, late, p_W
 ):
     monkeypatch.setattr(sessions, "LATE", late)
     bench, said, held_up = held.bench, [], threading.Event()
@@ -175,7 +167,7 @@ async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are
     with user:
         signs = list(ElementFilter(marker="busy"))
     try:
-        drag(bench, THERE)
+        drag(bench, p_W)
         assert not any(sign.visible for sign in signs)  # it would flicker in the hand
         bench.move_to(bench.coordinates)
         assert [sign.visible for sign in signs] == [True, True]
@@ -183,17 +175,7 @@ async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are
             await until(lambda: any("before" in words for words in said))
     finally:
         held_up.set()
-    await until(lambda: bench.answer is not before and not bench._busy)
+    await until(lambda: bench.answer is not before and not bench.is_computing)
     assert not any(sign.visible for sign in signs)
     assert not bench.results.differs(POSE_NUMBERS)
     assert any(said) == (late < 1.0)
-
-
-def test_who_moves_a_point_seldom_is_not_resting(bench, monkeypatch):
-    clock, rests = [0.0], []
-    monkeypatch.setattr(live_workspace.time, "monotonic", lambda: clock[0])
-    for between in (10.0, 0.1, 0.8, 5.0):
-        clock[0] += between
-        bench.live.follow(bench.robot.value)
-        rests.append(bench.live._rest())
-    assert rests == [REST, REST, pytest.approx(1.6), REST]

@@ -165,7 +165,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     board = _boards[bench]
     await until(lambda: board.draft is not None)
     assert board.draft.own_robot == ROBOT
-    assert board.draft.settings() == ()
+    await until(lambda: board.draft.settings() == ())
     says = lambda words: words in field(user, "run-robot").text  # noqa: E731
     await until(lambda: says(f"Runs {ROBOT}, the robot that is open."))
     bench.open("acrobot_large")

@@ -1,6 +1,7 @@
 """Documents, folder and poses of a workbench, without a page."""
 
 import json
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
-from cdpr_drake.studio.pose_answer import RobotQuestions, axis_values, pose_at, pose_axes
-from cdpr_drake.studio.scene import EXITS
+from cdpr_drake.studio.calculator import Calculator
+from cdpr_drake.studio.pose import answer_html
+from cdpr_drake.studio.pose_answer import PoseCoordinates, RobotQuestions
+from cdpr_drake.studio.scene import EXITS, R_EW, look_at_robot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.studio.workbench.yaml_edit import with_value
@@ -18,65 +21,73 @@ from tests.models.formats.foreign_files import caspr
 ROUNDING = 1e-9
 """Of coordinates, there and back [m, deg]."""
 
+APART = 2.0 / 300.0
+"""Exit points are at least so far apart, of half a window: about 2 px."""
+
+
+@pytest.fixture(scope="module")
+def calculator():
+    made = Calculator()
+    yield made
+    made.close()
+
 
 @pytest.fixture
-def bench(tmp_path):
-    made = Workbench(WorkingFolder(tmp_path))
-    yield made
-    made.calculator.close()
+def bench(tmp_path, calculator):
+    return Workbench(WorkingFolder(tmp_path), calculator=calculator)
 
 
-def moved(bench, x):
-    return with_value(bench.robot.text, ("cables", 0, "exit_point", 0), x)
+def move(bench, x):
+    bench.robot.change(with_value(bench.robot.text, ("cables", 0, "exit_point", 0), x))
 
 
-def test_changes_are_undone_and_done_again(bench):
+def place(bench):
+    return bench.robot.value.cables[0].exit_point[0]
+
+
+def test_changes_are_undone_and_done_again_and_wrong_ones_change_nothing(bench):
     start = bench.robot.text
-    bench.robot.change(moved(bench, -0.37))
-    bench.robot.change(moved(bench, -0.3))
-    assert bench.robot.value.cables[0].exit_point[0] == -0.3
+    move(bench, -0.37)
+    move(bench, -0.3)
     bench.robot.undo()
-    assert bench.robot.value.cables[0].exit_point[0] == -0.37
+    assert place(bench) == -0.37
     bench.robot.undo()
     assert bench.robot.text == start
     assert not bench.robot.can_undo
     bench.robot.redo()
-    assert bench.robot.value.cables[0].exit_point[0] == -0.37
-    bench.robot.change(moved(bench, -0.2))
+    assert place(bench) == -0.37
+    move(bench, -0.2)
     assert not bench.robot.can_redo
-
-
-def test_a_wrong_value_changes_nothing(bench):
     before = bench.robot.text, bench.robot.value
-    with pytest.raises(RobotFileError) as found:
+    with pytest.raises(RobotFileError) as refusal:
         bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), -1.0))
     assert (bench.robot.text, bench.robot.value) == before
-    assert bench.robot.words(found.value) == [
+    assert bench.robot.words(refusal.value) == [
         "platform.mass: found -1.0; accepted: a number > 0 and <= 1e+07 [kg]"
     ]
-    assert not bench.robot.can_undo
 
 
 def test_the_numbers_are_those_of_the_commands(bench, tmp_path, capsys):
-    bench.robot.change(moved(bench, -0.37))
+    move(bench, -0.37)
     bench.save("mine.yaml", overwrite=False)
     bench.move_to([0.1, -0.05, 0.3, 5.0, -3.0, 10.0])
-    file, answer = str(tmp_path / "mine.yaml"), bench.answer
-    pose = "--pose=0.1,-0.05,0.3,5,-3,10"
-    main_json = []
-    for arguments in (["tension", file, pose, "--json"], ["static", file, pose, "--json"]):
+    answers = {}
+    for command in ("tension", "static"):
         with pytest.raises(SystemExit):
-            main(arguments)
-        main_json.append(json.loads(capsys.readouterr().out))
-    tension, static = main_json
-    assert answer.tensions.tolist() == tension["tensions_n"]
-    assert answer.rest.tensions.tolist() == static["tensions_n"]
-    assert answer.rest.frequencies.tolist() == static["frequencies_hz"]
+            main([command, str(tmp_path / "mine.yaml"), "--pose=0.1,-0.05,0.3,5,-3,10", "--json"])
+        answers[command] = json.loads(capsys.readouterr().out)
+    assert bench.answer.tensions.tolist() == answers["tension"]["tensions_n"]
+    html = answer_html(bench.answer, bench.command_name)
+    assert all(f"</div></td><td>{tension:.2f}</td>" in html for tension in bench.answer.tensions)
+    assert "cdpr tension mine.yaml --pose=0.1,-0.05,0.3,5,-3,10 --method=" in html
+    assert bench.answer.rest.tensions.tolist() == answers["static"]["tensions_n"]
+    assert bench.answer.rest.frequencies.tolist() == answers["static"]["frequencies_hz"]
 
 
 def test_answers_say_why_there_is_none():
     robot = load_robot("acrobot_large")
-    answer = RobotQuestions(robot).at(pose_at(robot, [0.55, 0.55, 1.1, 80.0, 0.0, 0.0]))
+    far = PoseCoordinates(robot).pose([0.55, 0.55, 1.1, 80.0, 0.0, 0.0])
+    answer = RobotQuestions(robot).at(far)
     assert answer.status == "infeasible" or answer.why_no_tensions
     assert answer.rest is None
     assert answer.why_no_rest
@@ -85,13 +96,38 @@ def test_answers_say_why_there_is_none():
 @pytest.mark.parametrize("name", robot_names())
 def test_coordinates_of_every_robot_go_there_and_back(name):
     robot = load_robot(name)
-    axes, values = pose_axes(robot), axis_values(robot, robot.home.transform())
-    assert len(axes) == len(values)
-    assert len(axes) >= robot.motion_type().freedom
+    coordinates, home = PoseCoordinates(robot), robot.home.transform()
+    axes, values = coordinates.axes, coordinates.values(home)
+    assert len(axes) == len(values) >= robot.motion_type().freedom
     assert all(axis.lower <= v <= axis.upper for axis, v in zip(axes, values, strict=True))
-    X_WP = pose_at(robot, values)
-    assert X_WP.IsNearlyEqualTo(robot.home.transform(), 1e-9)
-    np.testing.assert_allclose(axis_values(robot, X_WP), values, atol=ROUNDING)
+    assert coordinates.pose(values).IsNearlyEqualTo(home, ROUNDING)
+    moved = [value + 0.1 for value in values]
+    np.testing.assert_allclose(coordinates.values(coordinates.pose(moved)), moved, atol=ROUNDING)
+
+
+class Eye:
+    """In place of Meshcat: where it is told to look from."""
+
+    def SetCameraPose(self, p_WE, p_WT):
+        self.p_WE, self.p_WT = p_WE, p_WT
+
+    def SetProperty(self, path, name, value):
+        setattr(self, name, value)
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_the_scene_shows_all_of_a_robot_whatever_its_size(name):
+    robot, eye = load_robot(name), Eye()
+    look_at_robot(eye, robot)
+    exits = np.unique(robot.cable_set().p_WA.T, axis=0)
+    frame = np.array(list(product(*zip(robot.frame.lower, robot.frame.upper, strict=True))))
+    p = (np.concatenate([exits, frame]) - eye.p_WE) @ R_EW.T
+    seen = -p[:, :2] / p[:, 2:] / np.tan(np.radians(eye.fov / 2.0))
+    sizes = np.max(np.abs(seen), axis=0) / (1.25, 1.0)  # the window is wider than high
+    assert 0.85 < np.max(sizes) < 0.95
+    assert eye.near < np.min(-p[:, 2]) < np.max(-p[:, 2]) < eye.far
+    apart = np.linalg.norm(seen[: len(exits), np.newaxis] - seen[: len(exits)], axis=2)
+    assert np.min(apart + 10.0 * np.eye(len(exits))) > APART
 
 
 def test_the_scene_follows_the_robot(bench):
@@ -115,22 +151,25 @@ def test_points_are_dragged(bench):
     assert bench.drag_point("exit", 0, np.array([-0.37, -0.525, 1.165]), done=True) == ""
     assert bench.robot.value.cables[0].exit_point.tolist() == [-0.37, -0.525, 1.165]
     bench.robot.undo()
-    assert bench.robot.text == start
     words = bench.drag_point("exit", 0, np.array([1e6, 0.0, 0.0]), done=True)
     assert "found 1000000.0; accepted: 3 numbers" in words
     assert bench.robot.text == start
     np.testing.assert_array_equal(bench.answer.tensions, before)
 
 
-def test_files_of_the_folder_are_saved_and_opened(bench, tmp_path):
+def test_files_of_the_folder_are_saved_and_opened(bench, tmp_path, monkeypatch):
     assert not bench.file
+    with monkeypatch.context() as patch:
+        patch.setattr("pathlib.Path.replace", full_disk)
+        with pytest.raises(OutputFolderError, match="No space left"):
+            bench.save("a.yaml", overwrite=False)
+    assert not list(tmp_path.iterdir())
     bench.save("a.yaml", overwrite=False)
-    assert bench.file == "a.yaml"
-    assert bench.is_saved
+    assert (bench.file, bench.is_saved) == ("a.yaml", True)
     with pytest.raises(OutputFolderError, match="is there already"):
         Workbench(WorkingFolder(tmp_path)).save("a.yaml", overwrite=False)
     text = (tmp_path / "a.yaml").read_text()
-    bench.robot.change(moved(bench, -0.37))
+    move(bench, -0.37)
     assert not bench.is_saved
     bench.robot.undo()
     assert bench.is_saved
@@ -140,6 +179,12 @@ def test_files_of_the_folder_are_saved_and_opened(bench, tmp_path):
     assert bench.robot.text == text
     bench.robot.undo()  # the planar robot, whose file this is not
     assert not bench.file
+    bench.upload({"a.yaml": text.encode()})
+    assert not bench.file  # what was uploaded is not what the folder has
+
+
+def full_disk(*_):
+    raise OSError(28, "No space left on device")
 
 
 @pytest.mark.parametrize(
@@ -152,27 +197,16 @@ def test_nothing_leads_out_of_the_folder(bench, tmp_path, name):
             action()
 
 
-def test_a_full_disk_is_said_and_leaves_nothing(bench, tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("pathlib.Path.replace", full)
-    with pytest.raises(OutputFolderError, match="No space left"):
-        bench.save("a.yaml", overwrite=False)
-    assert not list(tmp_path.iterdir())
-    assert not bench.file
-
-
 def test_foreign_files_are_uploaded(bench, tmp_path):
-    bodies = caspr(tmp_path)
-    files = {path.name: path.read_bytes() for path in tmp_path.glob("*.xml")}
-    opened = bench.upload(files)
-    assert bodies.name in files
+    caspr(tmp_path)
+    opened = bench.upload({path.name: path.read_bytes() for path in tmp_path.glob("*.xml")})
     assert "CASPR" in opened.notes[0]
-    assert bench.robot.value.name == "toy"
-    assert len(bench.robot.value.cables) == 8
+    assert (bench.robot.value.name, len(bench.robot.value.cables)) == ("toy", 8)
     assert not bench.file
     assert parse_robot(bench.robot.text, tmp_path / "toy.yaml").name == "toy"
+
+
+SDF = b"<sdf><model><include><uri>../../x</uri></include></model></sdf>"
 
 
 @pytest.mark.parametrize(
@@ -189,10 +223,7 @@ def test_foreign_files_are_uploaded(bench, tmp_path):
         ({"a.yaml": b"#" * 300_000}, "bytes"),
         ({"a.xml": b"#" * 5_000_000}, "bytes"),
         ({"m.xml": b"<mujoco><include file='/etc/passwd'/></mujoco>"}, "elsewhere"),
-        (
-            {"m.sdf": b"<sdf><model><include><uri>../../x</uri></include></model></sdf>"},
-            "elsewhere",
-        ),
+        ({"m.sdf": SDF}, "elsewhere"),
     ],
 )
 def test_wrong_files_are_refused_in_words(bench, files, words):
