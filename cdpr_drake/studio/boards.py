@@ -15,9 +15,7 @@ from typing import Any, Generic, TypeVar
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
-from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.workbench.command_form import CommandForm
-from cdpr_drake.systems.diagrams.load import load_scenario
 
 MOST_FOLDERS = 200
 """Results folders that are offered, the newest ones."""
@@ -59,19 +57,6 @@ class Entry(Generic[J]):
     asked: tuple[str, ...] = ()
     about: Mapping[str, str] = field(default_factory=dict)
     is_whole: bool = False
-
-    def scenario(self) -> Any | None:
-        """The scenario of a run; None: it is not known any more.
-
-        Raises:
-            CdprError: It is not accepted any more.
-        """
-        file = self.folder / "scenario.yaml"
-        if file.is_file():
-            return load_scenario(file)
-        if isinstance(self.job, RunJob):
-            return load_scenario(self.job.scenario, self.job.settings)
-        return None
 
 
 CommandEntry = Entry[Job]
