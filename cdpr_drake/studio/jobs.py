@@ -29,8 +29,12 @@ from cdpr_drake.schema.json_text import load_json
 COMMAND = (sys.executable, "-P", "-m", "cdpr_drake")
 """The command line; Python does not look for modules in the working folder, which is data."""
 
-LOOK_PERIOD = 0.1
-"""Time between looks at what a process says [s]."""
+HOME = str(Path(cdpr_drake.__file__).resolve().parent.parent)
+"""What Python finds the package in."""
+
+LOOK_PERIOD, LONGEST_END = 0.1, 20.0
+"""Times between looks at what a process says, and for jobs to put away what they have when the
+server ends [s]."""
 
 LONGEST_LINE, LARGEST_TAIL, LARGEST_OUTPUT = 500, 2**16, 64 * 2**20
 """Characters of a line of messages, and bytes of messages, the newest, and of results in JSON that
@@ -41,9 +45,6 @@ INTERRUPTED, INCOMPLETE, CLIENT_ENDED = 130, 3, 4
 
 MOST_JOBS = 200
 """Jobs that are remembered; the oldest that are over are forgotten."""
-
-LONGEST_END = 20.0
-"""Time that jobs have to put away what they have when the server ends [s]."""
 
 _PROGRESS = re.compile(r"progress: (?:(?P<title>.*?): +(?P<percent>\d{1,3}) %, )?(?P<words>.*)")
 _ERROR = "cdpr: "
@@ -161,11 +162,12 @@ class Job:
     async def _work(self) -> None:
         """Runs the process to its end, and keeps what it says."""
         with ExitStack() as stack:
-            out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
+            files = [await asyncio.to_thread(tempfile.TemporaryFile) for _ in range(2)]
+            out, err = (stack.enter_context(file).fileno() for file in files)
             theirs, self._lifeline = os.pipe()  # which no other child inherits
             stack.callback(os.close, self._lifeline)
             try:
-                process = await self._start(out.fileno(), err.fileno(), theirs)
+                process = await self._start(out, err, theirs)
             except (OSError, ValueError) as problem:
                 self.set_state(JobState.FAILED, f"cannot be started: {problem}")
                 return
@@ -176,21 +178,19 @@ class Job:
             try:
                 while process.returncode is None:
                     await asyncio.sleep(LOOK_PERIOD)
-                    self._hear(err.fileno())
+                    self._hear(err)
             finally:
                 if process.returncode is None:  # the event loop is ending
                     self._wish = signal.SIGKILL
                     self._signal()
                     await process.wait()
-            self._output = os.pread(out.fileno(), LARGEST_OUTPUT, 0)
+            self._output = os.pread(out, LARGEST_OUTPUT, 0)
         self._end(process.returncode)
 
     async def _start(self, out: int, err: int, lifeline: int) -> asyncio.subprocess.Process:
         """Starts the process with its files and the pipe of `cli.process.exit_with_parent`."""
-        home = str(Path(cdpr_drake.__file__).resolve().parent.parent)
-        paths = [path for path in (home, os.environ.get("PYTHONPATH")) if path]
         own = {
-            "PYTHONPATH": os.pathsep.join(paths),
+            "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
             "CDPR_PROGRESS_PERIOD": "1", "CDPR_LIFELINE": str(lifeline),
         }  # fmt: skip
         with self._steering or ExitStack():

@@ -20,7 +20,7 @@ from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch
-from cdpr_drake.studio.workbench.scenario_draft import ROBOT
+from cdpr_drake.studio.workbench.scenario_draft import ROBOT, ScenarioDraft
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -55,7 +55,7 @@ class RunPanel:
         """Places it into the current slot."""
         self._bench, self._board = bench, board
         self._form: ScenarioForm | None = None
-        self._shipped: list[str] = []
+        self._shipped: tuple[str, ...] = ()
         self._watch = RunWatch(bench, board)
         ui.add_css(STYLE)
         with ui.element("div").classes("cdpr-run"):
@@ -109,25 +109,38 @@ class RunPanel:
 
     async def _begin(self) -> None:
         """Offers scenarios, those of the working folder first."""
-        folder, draft = self._bench.folder, self._board.draft
-        self._shipped = list(await run.io_bound(robot_scenario_names) or ())
-        options = [*folder.files((".yaml", ".yml")), *self._shipped]
-        names = [self._bench.scenario] if draft is None else [draft.name, self._bench.scenario]
-        own = [option for name in names for option in (name, folder.shown(Path(name).resolve()))]
-        value = next((option for option in own if option in options), DEFAULT_SCENARIO)
-        self._scenario.set_options(options, value=value)
+
+        def scenarios() -> tuple[tuple[str, ...], list[str], str]:
+            folder, draft = self._bench.folder, self._board.draft
+            shipped = robot_scenario_names()
+            options = [*folder.files((".yaml", ".yml")), *shipped]
+            names = ["" if draft is None else draft.name, self._bench.scenario]
+            own = [
+                option for name in names for option in (name, folder.shown(Path(name).resolve()))
+            ]
+            return shipped, options, next((x for x in own if x in options), DEFAULT_SCENARIO)
+
+        offered = await run.io_bound(scenarios)
+        if offered is not None:  # the server is not ending
+            self._shipped, options, value = offered
+            self._scenario.set_options(options, value=value)
 
     async def _choose_scenario(self) -> None:
-        """Shows the form of another scenario."""
+        """Shows the form of another scenario; changes of the same one are kept."""
         name, self._form = self._scenario.value, None
+
+        def read() -> ScenarioDraft:
+            folder, draft = self._bench.folder, self._board.draft
+            file = name if name in self._shipped else str(folder.path(name))
+            return draft if draft and draft.name == file else ScenarioDraft(file, folder.root)
+
         self._body.clear()
         with self._body:
             spinner = ui.spinner(size="lg")
             with show_errors():
-                file = name if name in self._shipped else str(self._bench.folder.path(name))
-                draft = await run.io_bound(self._board.choose, file)
+                draft = await run.io_bound(read)
                 if draft is not None and name == self._scenario.value:  # not changed meanwhile
-                    form = ScenarioForm(draft)
+                    self._board.draft, form = draft, ScenarioForm(draft)
                     await self._take_robot()
                     self._form = form
             spinner.delete()

@@ -287,16 +287,6 @@ class RunBoard(Board[RunJob]):
         self.speed: float | None = 1.0
         self.cursor: float | None = None
 
-    def choose(self, scenario: str) -> ScenarioDraft:
-        """Works on a scenario from now on; changes of the same one are kept.
-
-        Raises:
-            CdprError: It is not accepted.
-        """
-        if self.draft is None or self.draft.name != scenario:
-            self.draft = ScenarioDraft(scenario, self._root)
-        return self.draft
-
     async def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
         """Begins a run of the draft, perhaps standing at the start, and looks at it.
 
