@@ -29,6 +29,10 @@ from cdpr_drake.schema.json_text import load_json
 COMMAND = (sys.executable, "-P", "-m", "cdpr_drake")
 """The command line; Python does not look for modules in the working folder, which is data."""
 
+PROGRESS_PERIOD, PROGRESS = "CDPR_PROGRESS_PERIOD", "progress: "
+"""Environment variable of the time between lines of progress [s], and how such a line begins, see
+`cli.terminal`."""
+
 HOME = str(Path(cdpr_drake.__file__).resolve().parent.parent)
 """What Python finds the package in."""
 
@@ -46,7 +50,7 @@ INTERRUPTED, INCOMPLETE, CLIENT_ENDED = 130, 3, 4
 MOST_JOBS = 200
 """Jobs that are remembered; the oldest that are over are forgotten."""
 
-_PROGRESS = re.compile(r"progress: (?:(?P<title>.*?): +(?P<percent>\d{1,3}) %, )?(?P<words>.*)")
+_PROGRESS = re.compile(rf"{PROGRESS}(?:(?P<title>.*?): +(?P<percent>\d+) %, )?(?P<words>.*)")
 _ERROR = "cdpr: "
 _numbers = itertools.count(1)
 
@@ -191,7 +195,7 @@ class Job:
         """Starts the process with its files and the pipe of `cli.process.exit_with_parent`."""
         own = {
             "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
-            "CDPR_PROGRESS_PERIOD": "1", "CDPR_LIFELINE": str(lifeline),
+            PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(lifeline),
         }  # fmt: skip
         with self._steering or ExitStack():
             ends = [] if self._steering is None else [self._steering.fileno()]
