@@ -1,8 +1,8 @@
 """Work in processes of their own: a `cdpr` command each, a few at a time.
 
 Drake and numba hold Python's lock, and what kills a run must not kill the server. A job belongs to
-the server, not to a page: whoever reloads a page, or opens another, finds it as it is. Jobs and
-their manager belong to the server's event loop; no other thread calls them.
+the server, not to a page: a reload, or another tab, finds it as it is. Jobs and their manager
+belong to the server's event loop; no other thread calls them.
 """
 
 from __future__ import annotations
@@ -15,37 +15,34 @@ import signal
 import sys
 import tempfile
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from enum import StrEnum
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from socket import socket
+from typing import Any, TypeVar
 
 import cdpr_drake
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
 
 COMMAND = (sys.executable, "-P", "-m", "cdpr_drake")
-"""The command line; Python does not look for modules in the working folder: what lies there is
-data."""
+"""The command line; Python does not look for modules in the working folder, which is data."""
 
 PROGRESS_PERIOD, PROGRESS = "CDPR_PROGRESS_PERIOD", "progress: "
 """Environment variable of the time between lines of progress [s], and how such a line begins, see
 `cli.terminal`."""
 
-LIFELINE = "CDPR_LIFELINE"
-"""Environment variable of the file descriptor at which a command sees the end of who started it,
-see `cli.process`."""
+HOME = str(Path(cdpr_drake.__file__).resolve().parent.parent)
+"""What Python finds the package in."""
 
-LOOK_PERIOD = 0.1
-"""Time between looks at what a process says [s]."""
+LOOK_PERIOD, LONGEST_END = 0.1, 20.0
+"""Times between looks at what a process says, and for jobs to put away what they have when the
+server ends [s]."""
 
-MOST_LINES, LONGEST_LINE, LONGEST_MESSAGE = 200, 2000, 500
-"""Lines of messages that are kept, and characters of a line and of a job's message."""
-
-LARGEST_OUTPUT = 64 * 2**20
-"""Bytes of results in JSON that are read."""
+LONGEST_LINE, LARGEST_TAIL, LARGEST_OUTPUT = 500, 2**16, 64 * 2**20
+"""Characters of a line of messages, and bytes of messages, the newest, and of results in JSON that
+are read."""
 
 INTERRUPTED, INCOMPLETE, CLIENT_ENDED = 130, 3, 4
 """Exit codes of `cdpr` for work that was stopped and kept, and for complete data with a remark."""
@@ -53,35 +50,28 @@ INTERRUPTED, INCOMPLETE, CLIENT_ENDED = 130, 3, 4
 MOST_JOBS = 200
 """Jobs that are remembered; the oldest that are over are forgotten."""
 
-LONGEST_END = 20.0
-"""Time that jobs have to put away what they have when the server ends [s]."""
-
-_SHARE = re.compile(r"^(?P<what>.*?): +(?P<percent>\d{1,3}) %, (?P<words>.*)$")
+_PROGRESS = re.compile(rf"{PROGRESS}(?:(?P<title>.*?): +(?P<percent>\d+) %, )?(?P<words>.*)")
 _ERROR = "cdpr: "
 _numbers = itertools.count(1)
 
 
-class JobError(CdprError):
-    """A job cannot be asked for that, or not now."""
-
-
 class JobState(StrEnum):
-    """How a job stands."""
+    """State of a job."""
 
     QUEUED, RUNNING, PAUSED, STOPPING = "queued", "running", "paused", "stopping"
     FINISHED, FAILED, STOPPED = "finished", "failed", "stopped"
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing will change it any more."""
+        """True if nothing will change it any more."""
         return self in (JobState.FINISHED, JobState.FAILED, JobState.STOPPED)
 
 
 class Job:
     """Runs `cdpr SUBCOMMAND ...`, with what it prints as JSON as the result.
 
-    What it says and prints goes to files, so that it never waits for who reads. Of a server that
-    was killed it hears by the end of a pipe that only the server has, and stops by itself.
+    What it says and prints goes to files, so that it never waits for a reader. If the server is
+    killed, the job sees the end of a pipe that only the server has, and stops by itself.
 
     Attributes:
         program: What is run with the arguments.
@@ -89,24 +79,20 @@ class Job:
         title: What it is, in a few words.
         arguments: Of the command, from the name of the subcommand on.
         working: Folder that it is run in.
-        folder: Where its results will be; None: nowhere.
-        state: How it stands.
-        message: Why it failed, or what else is to be said about its end, in one line; else empty.
+        folder: Folder of its results; None: there is none.
+        state: Its state.
+        message: Why it failed, or another remark about its end, in one line; else empty.
         progress: Share of the work that is done, from 0 to 1, or None; and words about it.
+        lines: What it said besides its progress, the newest lines.
         changed: Called when `state` has changed.
     """
 
     program: Sequence[str] = COMMAND
 
     def __init__(
-        self,
-        title: str,
-        arguments: Sequence[str],
-        working: Path,
-        folder: Path | None = None,
-        *,
+        self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None, *,
         done_with: Path | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Queued; arguments as the attributes, an option --json is up to the caller.
 
         `done_with` is a file that is removed when the work is done, or left no folder.
@@ -116,26 +102,15 @@ class Job:
         self.folder, self._done_with = folder, done_with
         self.state, self.message = JobState.QUEUED, ""
         self.progress: tuple[float | None, str] = (None, "")
+        self.lines: list[str] = []
         self.changed: Callable[[], None] = lambda: None
-        self._lines: deque[str] = deque(maxlen=MOST_LINES)
-        self._says_progress = True
-        self._read, self._rest, self._output = 0, b"", b""
+        self._output = b""
         self._process: asyncio.subprocess.Process | None = None
         self._lifeline = -1
+        self._steering: socket | None = None  # which the process alone keeps
         self._wish: signal.Signals | None = None
         self._over = asyncio.Event()
-        self._task: asyncio.Task[None] | None = None
         self._started = self._ended = 0.0
-
-    @property
-    def process_id(self) -> int | None:
-        """Of the process; None where there is none yet."""
-        return None if self._process is None else self._process.pid
-
-    @property
-    def lines(self) -> list[str]:
-        """What it said besides its progress, the newest `MOST_LINES` lines."""
-        return list(self._lines)
 
     @property
     def elapsed(self) -> float:
@@ -143,169 +118,144 @@ class Job:
         return (self._ended or time.monotonic()) - self._started if self._started else 0.0
 
     def result(self) -> Any:
-        """What it printed as JSON; None where that was none."""
-        try:
+        """What it printed as JSON; None if that was none."""
+        with suppress(ValueError):
             return load_json(self._output)
-        except ValueError:
-            return None
+        return None
 
     async def wait(self, seconds: float | None = None) -> bool:
-        """Waits until it is over, at most so long; returns whether it is."""
+        """Waits until it is over, at most so long; returns True if it is."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self._over.wait(), seconds)
         return self.state.is_over
 
     def begin(self) -> None:
         """Starts to work; a failure of that is one of the job."""
-        if self.state == JobState.QUEUED:
-            self._started = time.monotonic()
-            self._task = asyncio.create_task(self._work(), name=f"job {self.number}")
-            self.set_state(JobState.RUNNING)
+        self._started = time.monotonic()
+        self._task = asyncio.create_task(self._work(), name=f"job {self.number}")
+        self.set_state(JobState.RUNNING)
 
-    def stop(self) -> None:
-        """Asks it to stop and to keep what it has; one that is queued never begins."""
-        self._end_by(signal.SIGTERM)
+    def stop(self, wish: signal.Signals = signal.SIGTERM) -> None:
+        """Asks it to stop and to keep what it has; one that is queued never begins.
 
-    def kill(self) -> None:
-        """Ends it at once, with all that it started."""
-        self._end_by(signal.SIGKILL)
+        SIGKILL ends it at once, with all that it started.
+        """
+        if not self.state.is_over and wish != self._wish:  # a second SIGTERM would keep nothing
+            self._wish = wish
+            queued = self.state == JobState.QUEUED
+            self.set_state(JobState.STOPPED if queued else JobState.STOPPING)
+            self._signal()
 
     def set_state(self, state: JobState, message: str = "") -> None:
-        """Changes how it stands; what is over stays as it is."""
+        """Changes its state; what is over stays as it is."""
         if self.state.is_over:
             return
-        line = " ".join(message.split())
-        longest = LONGEST_MESSAGE - 4
-        self.message = line if len(line) <= LONGEST_MESSAGE else f"{line[:longest]} ..."
-        self.state = state
+        self.state, self.message = state, _short(" ".join(message.split()))
         if state.is_over:
             self._ended = time.monotonic()
             self._over.set()
         self.changed()
 
-    def _end_by(self, wish: signal.Signals) -> None:
-        if self.state.is_over or self._wish in (wish, signal.SIGKILL):
-            return
-        self._wish = wish
-        if self.state == JobState.QUEUED:
-            self.set_state(JobState.STOPPED)
-            return
-        self.set_state(JobState.STOPPING)
-        self._signal(wish)
-
-    def _signal(self, number: signal.Signals) -> None:
+    def _signal(self) -> None:
         """Commands take SIGTERM as a wish; SIGKILL goes to the whole group."""
-        process = self._process
-        if process is not None and process.returncode is None:
+        process, wish = self._process, self._wish
+        if process is not None and process.returncode is None and wish is not None:
             with suppress(ProcessLookupError, PermissionError):
-                (os.killpg if number == signal.SIGKILL else os.kill)(process.pid, number)
+                (os.killpg if wish == signal.SIGKILL else os.kill)(process.pid, wish)
 
     async def _work(self) -> None:
-        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        """Runs the process to its end, and keeps what it says."""
+        with ExitStack() as stack:
+            files = [await asyncio.to_thread(tempfile.TemporaryFile) for _ in range(2)]
+            out, err = (stack.enter_context(file).fileno() for file in files)
+            theirs, self._lifeline = os.pipe()  # which no other child inherits
+            stack.callback(os.close, self._lifeline)
             try:
-                code = await self._run(out, err)
+                process = await self._start(out, err, theirs)
             except (OSError, ValueError) as problem:
                 self.set_state(JobState.FAILED, f"cannot be started: {problem}")
                 return
-            if os.fstat(out.fileno()).st_size <= LARGEST_OUTPUT:
-                self._output = os.pread(out.fileno(), LARGEST_OUTPUT, 0)
-        self._end(code)
-
-    async def _run(self, out: IO[bytes], err: IO[bytes]) -> int:
-        """Runs the process to its end, and returns its exit code, negative for a signal."""
-        theirs, self._lifeline = os.pipe()  # which no other child inherits
-        try:
-            try:
-                self._process = process = await self._start(out, err, (theirs,))
             finally:
                 os.close(theirs)
-            if self._wish is not None:
-                self._signal(self._wish)
-            ending = asyncio.create_task(process.wait())
-            while not ending.done():
-                await asyncio.wait([ending], timeout=LOOK_PERIOD)
-                self._hear(err)
-            self._hear(err, ended=True)
-            return ending.result()
-        finally:
-            os.close(self._lifeline)
-            if self._process is not None and self._process.returncode is None:
-                self._signal(signal.SIGKILL)  # the event loop is ending
-                await self._process.wait()
+            self._process = process
+            self._signal()
+            try:
+                while process.returncode is None:
+                    await asyncio.sleep(LOOK_PERIOD)
+                    self._hear(err)
+            finally:
+                if process.returncode is None:  # the event loop is ending
+                    self._wish = signal.SIGKILL
+                    self._signal()
+                    await process.wait()
+            self._output = os.pread(out, LARGEST_OUTPUT, 0)
+        self._end(process.returncode)
 
-    async def _start(
-        self, out: IO[bytes], err: IO[bytes], kept: Sequence[int], more: Sequence[str] = ()
-    ) -> asyncio.subprocess.Process:
-        """Starts the process, which gets some file descriptors, the first its lifeline."""
-        home = str(Path(cdpr_drake.__file__).resolve().parent.parent)
-        before = os.environ.get("PYTHONPATH", "")
-        environment = os.environ | {
-            "PYTHONPATH": os.pathsep.join(part for part in (home, before) if part),
-            PROGRESS_PERIOD: "1", LIFELINE: str(kept[0]),
+    async def _start(self, out: int, err: int, lifeline: int) -> asyncio.subprocess.Process:
+        """Starts the process with its files and the pipe of `cli.process.exit_with_parent`."""
+        own = {
+            "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
+            PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(lifeline),
         }  # fmt: skip
-        return await asyncio.create_subprocess_exec(
-            *self.program, *self.arguments, *more, cwd=self.working, env=environment,
-            stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err, pass_fds=kept,
-            start_new_session=True,
-        )  # fmt: skip
+        with self._steering or ExitStack():
+            ends = [] if self._steering is None else [self._steering.fileno()]
+            steered = [f"--steered-by={end}" for end in ends]
+            return await asyncio.create_subprocess_exec(
+                *self.program, *self.arguments, *steered, cwd=self.working, env=os.environ | own,
+                stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
+                pass_fds=(lifeline, *ends), start_new_session=True,
+            )  # fmt: skip
 
-    def _hear(self, err: IO[bytes], *, ended: bool = False) -> None:
-        """Takes the lines that are new; an unfinished one when it is whole, or at the end."""
-        piece = os.pread(err.fileno(), os.fstat(err.fileno()).st_size - self._read, self._read)
-        self._read += len(piece)
-        *whole, self._rest = (self._rest + piece + b"\n" * ended).split(b"\n")
-        for words in whole:
-            line = words.decode(errors="replace")[:LONGEST_LINE].rstrip()
-            progress = progress_of(line)
-            if progress is None and line:
-                self._lines.append(line)
-            elif progress is not None and self._says_progress:
-                self.progress = progress
+    def _hear(self, err: int) -> None:
+        """Takes what was said, the newest of it where it is much."""
+        tail = os.pread(err, LARGEST_TAIL, max(os.fstat(err).st_size - LARGEST_TAIL, 0))
+        lines = [_short(line.rstrip()) for line in tail.decode(errors="replace").split("\n")]
+        self.lines = [line for line in lines if line and progress_of(line) is None]
+        self.progress = next(filter(None, map(progress_of, reversed(lines))), self.progress)
 
     def _end(self, code: int) -> None:
         """Says how it ended, by its exit code."""
-        done, lines = code in (0, INCOMPLETE, CLIENT_ENDED), self.lines
+        done, last = code in (0, INCOMPLETE, CLIENT_ENDED), self.lines[-1] if self.lines else ""
         if self._done_with is not None and (done or not (self.folder and self.folder.is_dir())):
             with suppress(OSError):
                 self._done_with.unlink(missing_ok=True)
         if done:
             self.progress = (1.0, "")
-            self.set_state(JobState.FINISHED, reason(lines, code) if code and lines else "")
+            self.set_state(JobState.FINISHED, reason(self.lines, code) if code and last else "")
         elif self._wish is not None:
-            self.set_state(JobState.STOPPED, lines[-1] if code == INTERRUPTED and lines else "")
+            self.set_state(JobState.STOPPED, last if code == INTERRUPTED else "")
         else:
-            self.set_state(JobState.FAILED, reason(lines, code))
+            self.set_state(JobState.FAILED, reason(self.lines, code))
 
 
 def progress_of(line: str) -> tuple[float | None, str] | None:
-    """Share from 0 to 1, None where it says none, and words of a line of progress; None: no such
-    line."""
-    if not line.startswith(PROGRESS):
-        return None
-    words = line.removeprefix(PROGRESS)
-    found = _SHARE.match(words)
-    if found is None:
-        return None, words
-    return min(int(found["percent"]) / 100.0, 1.0), f"{found['what']}: {found['words']}"
+    """Share from 0 to 1, or None, and words of a line of progress; None: it is no such line."""
+    match = _PROGRESS.match(line)
+    if match is None or match["percent"] is None:
+        return None if match is None else (None, match["words"])
+    return min(int(match["percent"]) / 100.0, 1.0), f"{match['title']}: {match['words']}"
 
 
 def reason(lines: Sequence[str], code: int) -> str:
     """Why a command failed, in one line, from its messages and its exit code."""
-    said = [line.removeprefix(_ERROR) for line in lines if line.startswith(_ERROR)]
-    if said:
-        more = len(said) - 1
-        return said[0] + (f"; and {more} more" if more else "")
+    errors = [line.removeprefix(_ERROR) for line in lines if line.startswith(_ERROR)]
+    if errors:
+        return errors[0] + (f"; and {len(errors) - 1} more" if errors[1:] else "")
     if code < 0:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         return f"the process was ended by {name}"
     return f"exit code {code}: {lines[-1] if lines else 'it said nothing'}"
 
 
+def _short(line: str) -> str:
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 4]} ..."
+
+
 J = TypeVar("J", bound=Job)
 
 
 class JobManager:
-    """The jobs of a server, in the order in which they were asked for.
+    """The jobs of a server, in the order in which they were submitted.
 
     Attributes:
         at_once: How many of them work at a time; what is paused takes no place.
@@ -324,17 +274,17 @@ class JobManager:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job works."""
+        """True if a job works."""
         return self._count() > 0
 
     def submit(self, job: J) -> J:
         """Takes a job over, and begins it when there is room.
 
         Raises:
-            JobError: The server is ending.
+            CdprError: The server is ending.
         """
         if self._closed:
-            raise JobError("the server is ending; nothing new is begun")
+            raise CdprError("the server is ending; nothing new is begun")
         over = [old for old in self.jobs if old.state.is_over]
         for old in over[: max(len(self.jobs) + 1 - MOST_JOBS, 0)]:
             self.jobs.remove(old)
@@ -346,11 +296,9 @@ class JobManager:
     def free_folder(self, base: Path) -> Path:
         """The first of base, base-2, ... that is not there and that no job will write."""
         taken = {job.folder for job in self.jobs if not job.state.is_over}
-        names = (base.with_name(f"{base.name}-{number}") for number in itertools.count(2))
-        return next(
-            folder for folder in itertools.chain([base], names)
-            if not folder.exists() and folder not in taken
-        )  # fmt: skip
+        later = (base.with_name(f"{base.name}-{number}") for number in itertools.count(2))
+        folders = itertools.chain([base], later)
+        return next(path for path in folders if not path.exists() and path not in taken)
 
     async def close(self, seconds: float = LONGEST_END) -> None:
         """Stops all jobs, lets them put away what they have, and returns when they are over.
@@ -359,12 +307,10 @@ class JobManager:
         """
         self._closed = True
         left = [job for job in self.jobs if not job.state.is_over]
-        for job in left:
-            job.stop()
-        await asyncio.gather(*(job.wait(seconds) for job in left))
-        for job in left:
-            job.kill()
-        await asyncio.gather(*(job.wait(1.0) for job in left))
+        for wish, longest in ((signal.SIGTERM, seconds), (signal.SIGKILL, 1.0)):
+            for job in left:
+                job.stop(wish)
+            await asyncio.gather(*(job.wait(longest) for job in left))
 
     def _begin_next(self) -> None:
         for job in self.jobs:

@@ -92,7 +92,7 @@ export default {
         if (this.token !== null) {
           const token = this.token;
           this.token = null;
-          this.$emit("drawn", { token });
+          this.$emit("drawn", token);
         }
       });
     },

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,9 +20,6 @@ DASHES: dict[str, tuple[float, ...]] = {
     "-": (), "--": (6.0, 3.0), "-.": (8.0, 3.0, 2.0, 3.0), ":": (2.0, 3.0),
 }  # fmt: skip
 """Dashes of the palette's names [px]."""
-
-ROTATION = Look(ANGLE.color, DASHED)
-"""Dashed, as both errors often are the same curve, each in its unit."""
 
 LONGEST_SILENCE = 5.0
 """Time after which a browser that does not answer gets rows again [s]."""
@@ -51,16 +47,11 @@ class Chart:
 
     def plain(self) -> dict[str, Any]:
         """For JSON."""
-        series = [
-            {
-                "name": name,
-                "color": look.color,
-                "dash": list(DASHES[look.dash] if isinstance(look.dash, str) else look.dash[1]),
-            }
-            for name, look in self.series
-        ]
-        limits = list(self.limits)
-        return {"title": self.title, "right": self.right, "limits": limits, "series": series}
+        series = []
+        for name, look in self.series:
+            dash = DASHES[look.dash] if isinstance(look.dash, str) else look.dash[1]
+            series.append({"name": name, "color": look.color, "dash": dash})
+        return {"title": self.title, "right": self.right, "limits": self.limits, "series": series}
 
 
 def charts_of(cables: Sequence[str], limits: Sequence[float]) -> tuple[Chart, ...]:
@@ -72,7 +63,8 @@ def charts_of(cables: Sequence[str], limits: Sequence[float]) -> tuple[Chart, ..
     """
     low, high = limits
     each = tuple((name, nth_look(number)) for number, name in enumerate(cables))
-    errors = (("position", DISTANCE), ("rotation", ROTATION))
+    # Dashed, as both errors often are the same curve, each in its unit.
+    errors = (("position", DISTANCE), ("rotation", Look(ANGLE.color, DASHED)))
     return (
         Chart("position error [mm]", errors, right="rotation error [deg]"),
         Chart(f"tension [N], limits {low:g} and {high:g} N", each, (low, high)),
@@ -99,9 +91,8 @@ class MovingPlots(ui.element, component="plots.js"):
     def __init__(self, mounted: Callable[[], None]) -> None:
         """Without charts; `mounted` is called whenever a browser shows it anew, empty."""
         super().__init__()
-        self._tokens = itertools.count(1)
-        self._sent: int | None = None  # token of rows that are not drawn yet
-        self._sent_at, self._lag = 0.0, FIRST_LAG
+        self._sent: float | None = None  # when rows were sent that are not drawn yet
+        self._lag = FIRST_LAG
         self.on("drawn", self._drawn)
         self.on("mounted", lambda _: mounted())
 
@@ -112,21 +103,20 @@ class MovingPlots(ui.element, component="plots.js"):
 
     def put(self, rows: Sequence[Row]) -> None:
         """Adds rows; to be called when the browser is ready for them."""
-        self._sent, self._sent_at = next(self._tokens), monotonic()
+        self._sent = monotonic()
         self.run_method("put", rows, self._sent)
 
     @property
     def is_ready(self) -> bool:
         """True if the browser has drawn all that it was sent, or has been silent for long."""
-        return self._sent is None or monotonic() - self._sent_at > LONGEST_SILENCE
+        return self._sent is None or monotonic() - self._sent > LONGEST_SILENCE
 
     @property
     def lag(self) -> float:
         """Longest recent time from sending rows to the answer that they are drawn [s]."""
-        return max(self._lag, 0.0 if self._sent is None else monotonic() - self._sent_at)
+        return max(self._lag, 0.0 if self._sent is None else monotonic() - self._sent)
 
     def _drawn(self, event: GenericEventArguments) -> None:
-        args: Any = event.args
-        if isinstance(args, dict) and args.get("token") == self._sent:
+        if self._sent is not None and event.args == self._sent:
+            self._lag = max(monotonic() - self._sent, FADES * self._lag)
             self._sent = None
-            self._lag = max(monotonic() - self._sent_at, FADES * self._lag)

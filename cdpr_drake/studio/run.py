@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -13,16 +12,15 @@ from nicegui import run, ui
 from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
+from cdpr_drake.studio.panel import COMPARED, RUN, notify, on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.run_board import RunBoard, RunEntry
+from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
-from cdpr_drake.studio.watch import RunWatch, SceneOfRuns, SteeringBar
-from cdpr_drake.studio.workbench.scenario_draft import ROBOT
+from cdpr_drake.studio.watch import RunWatch
+from cdpr_drake.studio.workbench.scenario_draft import ROBOT, ScenarioDraft
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -42,29 +40,23 @@ EMPTY = (
 )
 
 _boards: WeakKeyDictionary[Workbench, RunBoard] = WeakKeyDictionary()
-_scenes: WeakKeyDictionary[Workbench, SceneOfRuns] = WeakKeyDictionary()
 """What each session looks at, as long as it has a workbench."""
 
 
 def run_panel(bench: Workbench) -> None:
     """Places the run panel."""
-    board = _boards.setdefault(bench, RunBoard(bench.jobs, bench.folder.root))
-    RunPanel(bench, board, _scenes.setdefault(bench, SceneOfRuns(bench)))
+    RunPanel(bench, _boards.setdefault(bench, RunBoard(bench.jobs, bench.folder.root)))
 
 
 class RunPanel:
     """The panel in one tab of a browser."""
 
-    def __init__(self, bench: Workbench, board: RunBoard, scene: SceneOfRuns) -> None:
+    def __init__(self, bench: Workbench, board: RunBoard) -> None:
         """Places it into the current slot."""
-        self._bench, self._board, self._scene = bench, board, scene
+        self._bench, self._board = bench, board
         self._form: ScenarioForm | None = None
-        self._key = self._other = ""
-        self._shipped: frozenset[str] = frozenset()
-        self._read = asyncio.Event()  # set while the chosen scenario has been read
-        self._refused: CdprError | None = None
-        self._names: dict[str, str] = {}
-        self._stamps: dict[str, str] = {}
+        self._shipped: tuple[str, ...] = ()
+        self._watch = RunWatch(bench, board)
         ui.add_css(STYLE)
         with ui.element("div").classes("cdpr-run"):
             self._place_start()
@@ -72,7 +64,7 @@ class RunPanel:
         with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
             self._body = ui.element("div")
         ui.timer(0.0, self._begin, once=True)
-        on_page(bench.robot.changed, self._robot_changed)
+        on_page(bench.robot.changed, self._take_robot)  # type: ignore[arg-type]
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
 
@@ -86,89 +78,90 @@ class RunPanel:
             self._by_hand.props('title="Cables can be broken and the platform pushed"')
             self._start_button = ui.button("Start", icon="play_circle", on_click=self._start)
             self._start_button.props("no-caps").mark("start")
+            self._start_button.bind_enabled_from(self, "_form", lambda form: form is not None)
         with ui.row().classes("w-full items-center no-wrap"):
             self._which = ui.label().classes("studio-soft").mark("run-robot")
             self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
             self._own.props("dense no-caps outline")
 
     def _place_watch(self) -> None:
+        board, watch = self._board, self._watch
         with ui.row().classes("w-full items-center no-wrap"):
             self._run = ui.select({}, label="run", on_change=self._choose_run)
             self._run.props("dense outlined").classes("col").mark("run")
-            self._bar = SteeringBar(self._board, lambda: self._watch.job if self._key else None)
-        self._empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
-        self._watch = RunWatch(self._board, self._scene)
+            watch.place_steering()
+        empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
+        empty.bind_visibility_from(board, "shown", lambda key: not key)
+        watch.place()
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
             self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
             self._compare.on_value_change(self._choose_other)
             span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
-            span.on_value_change(lambda: self._watch.show_span(SPANS[str(span.value)]))
+            span.on_value_change(lambda: watch.show_span(SPANS[str(span.value)]))
             ui.space()
-            self._recover = ui.button("Write the results so far", on_click=self._recover_run)
-            self._recover.props("no-caps outline").mark("recover")
-            self._download = ui.button("Download", icon="download", on_click=self._send_all)
-            self._download.props('no-caps outline title="All files of the run"').mark("download")
-        self._download.visible = self._recover.visible = False
+            recover = ui.button("Write the results so far", on_click=self._recover)
+            recover.props("no-caps outline").mark("recover")
+            recover.bind_visibility_from(watch, "files", self._can_recover)
+            download = ui.button("Download", icon="download", on_click=self._download)
+            download.props('no-caps outline title="All files of the run"').mark("download")
+            download.bind_visibility_from(watch, "files", bool)
 
     async def _begin(self) -> None:
         """Offers scenarios, those of the working folder first."""
-        shipped = await run.io_bound(robot_scenario_names)
-        if shipped is None:  # the server is ending
-            return
-        self._shipped = frozenset(shipped)
-        folder, draft = self._bench.folder, self._board.draft
-        options = [*folder.files((".yaml", ".yml")), *shipped]
-        names = [
-            name for name in ("" if draft is None else draft.name, self._bench.scenario) if name
-        ]
-        known = (option for name in names for option in (name, folder.shown(Path(name).resolve())))
-        value = next((option for option in known if option in options), DEFAULT_SCENARIO)
-        self._scenario.set_options(options, value=value)
+
+        def scenarios() -> tuple[tuple[str, ...], list[str], str]:
+            folder, draft = self._bench.folder, self._board.draft
+            shipped = robot_scenario_names()
+            options = [*folder.files((".yaml", ".yml")), *shipped]
+            names = ["" if draft is None else draft.name, self._bench.scenario]
+            own = [
+                option for name in names for option in (name, folder.shown(Path(name).resolve()))
+            ]
+            return shipped, options, next((x for x in own if x in options), DEFAULT_SCENARIO)
+
+        offered = await run.io_bound(scenarios)
+        if offered is not None:  # the server is not ending
+            self._shipped, options, value = offered
+            self._scenario.set_options(options, value=value)
 
     async def _choose_scenario(self) -> None:
-        """Shows the form of another scenario; `Start` waits for it."""
-        name = self._scenario.value
-        if not name:
-            return
+        """Shows the form of another scenario; changes of the same one are kept."""
+        name, self._form = self._scenario.value, None
+
+        def read() -> ScenarioDraft:
+            folder, draft = self._bench.folder, self._board.draft
+            file = name if name in self._shipped else str(folder.path(name))
+            return draft if draft and draft.name == file else ScenarioDraft(file, folder.root)
+
         self._body.clear()
-        self._form = None
-        self._read.clear()
-        try:
-            with self._body, show_errors():
-                ui.spinner(size="lg")
-                file = name if name in self._shipped else str(self._bench.folder.path(name))
-                draft = await run.io_bound(self._board.choose, file)
+        with self._body:
+            spinner = ui.spinner(size="lg")
+            with show_errors():
+                draft = await run.io_bound(read)
                 if draft is not None and name == self._scenario.value:  # not changed meanwhile
-                    self._body.clear()
-                    self._form = ScenarioForm(draft)
+                    self._board.draft, form = draft, ScenarioForm(draft)
                     await self._take_robot()
-        finally:
-            if name == self._scenario.value:
-                self._read.set()
-                if self._form is None:
-                    self._body.clear()
+                    self._form = form
+            spinner.delete()
 
-    async def _robot_changed(self) -> None:
-        with show_errors():
-            await self._take_robot()
-
-    async def _take_robot(self) -> None:
-        """Lets the next run be of the robot that is open, and says so."""
+    async def _take_robot(self) -> bool:
+        """Lets the next run be of the open robot, and says so; returns False if it cannot be."""
         draft = self._board.draft
         if draft is None:
-            return
+            return False
         own, now = draft.own_robot, self._bench.subject
-        own_subject = await run.io_bound(_subject_named, own)
-        self._refused, is_own = None, own_subject is not None and not own_subject.is_another(now)
+        subject = await run.io_bound(_subject_named, own)
+        is_own, fits = subject is not None and not subject.is_another(now), True
         words = f"Runs {now.robot}, the robot that is open"
         try:
             draft.change(ROBOT, own if is_own else robot_argument(self._bench))
             words += "." if is_own else f", instead of the scenario's {own}."
         except CdprError as problem:
-            self._refused, words = problem, f"Nothing can be started: {problem}."
+            words, fits = f"Nothing can be started: {problem}.", False
         self._which.text, self._own.text = words, f"Open {own}"
-        self._own.set_visibility(not is_own)
+        self._own.visible = not is_own
+        return fits
 
     async def _open_own_robot(self) -> None:
         with show_errors():
@@ -179,38 +172,35 @@ class RunPanel:
 
     async def _start(self) -> None:
         self._start_button.props("loading")
-        try:
-            await self._read.wait()
+        with show_errors():
             if self._form is not None and await self._form.check():
-                with show_errors():
-                    await self._take_robot()
-                    if self._refused is not None:
-                        raise self._refused
+                if await self._take_robot():
                     paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
                     await self._board.start(paused=paused, by_hand=by_hand)
-                    self._refresh_runs()
-        finally:
-            self._start_button.props(remove="loading")
+                    self._refresh()
+                else:
+                    notify(self._which.text)
+        self._start_button.props(remove="loading")
 
     def _choose_run(self) -> None:
-        if self._run.value and self._run.value != self._key:
+        if self._run.value and self._run.value != self._board.shown:
             self._board.shown, self._board.cursor = str(self._run.value), None
-            self._refresh_runs()
+            self._refresh()
 
-    async def _choose_other(self) -> None:
+    def _choose_other(self) -> None:
         self._board.compared = "" if self._compare.value == NOTHING else str(self._compare.value)
-        await self._show_other()
 
-    async def _show_other(self) -> None:
-        self._other = self._board.compared
-        await self._watch.compare(self._board.run(self._other) if self._other else None)
+    def _can_recover(self, files: frozenset[str]) -> bool:
+        """True if a run that was killed left the log of what it had simulated."""
+        job = self._watch.job
+        return job is not None and job.state == JobState.FAILED and PARTS in files
 
-    def _recover_run(self) -> None:
+    def _recover(self) -> None:
         with show_errors():
             if self._watch.job is not None:
                 self._board.recover(self._watch.job)
 
-    async def _send_all(self) -> None:
+    async def _download(self) -> None:
         if self._watch.entry is not None:
             await send_file(self._watch.entry.folder)
 
@@ -219,77 +209,35 @@ class RunPanel:
             self._watch.tick()
 
     async def _slow_tick(self) -> None:
+        board, watch = self._board, self._watch
         with show_errors():
-            self._refresh_runs()
-            await self._watch.tick_slowly()
-            await self._say_subjects()
-            if self._board.compared != self._other:
-                self._compare.value = self._board.compared or NOTHING
-                await self._show_other()
-            if self._bench.panel not in ("", "run"):
-                self._scene.give_back()
-            elif self._scene.was_missed:
-                self._watch.draw_again()
+            self._refresh()
+            await watch.follow()
+            await watch.compare(board.choices().get(board.compared))
+            self._bench.results.show(RUN, watch.run.subject)
+            self._bench.results.show(COMPARED, watch.other.subject if watch.other else None)
 
-    async def _say_subjects(self) -> None:
-        """Says of which robots the runs are that are shown."""
+    def _refresh(self) -> None:
+        """Offers the runs that there are, and shows the one that the session looks at."""
         board, choices = self._board, self._board.choices()
-        for name, key in ((RUN, board.shown), (COMPARED, board.compared)):
-            entry = choices.get(key)
-            stamp = f"{key} {'' if entry is None else entry.folder.is_dir()}"
-            if self._stamps.get(name) != stamp:
-                self._stamps[name] = stamp
-                robot = None if entry is None else await run.io_bound(_robot_of, entry)
-                self._bench.results.show(name, None if robot is None else subject_of(robot))
-
-    def _offer_others(self, choices: Mapping[str, RunEntry]) -> None:
-        """Offers all finished runs to be compared with, but the one that is shown."""
-        board = self._board
+        if board.shown not in choices:
+            board.shown = next((key for key, entry in choices.items() if entry.job), "")
         if board.compared == board.shown:
             board.compared = ""
+        _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
         others = {NOTHING: NOTHING} | {
             key: entry.folder.name for key, entry in choices.items()
             if key != board.shown and (entry.job is None or entry.job.state == JobState.FINISHED)
         }  # fmt: skip
-        if others != self._compare.options:
-            value = self._compare.value if self._compare.value in others else NOTHING
-            self._compare.set_options(others, value=value)
-
-    def _refresh_runs(self) -> None:
-        """Offers the runs that there are, and shows the one that the session looks at."""
-        board = self._board
-        choices = board.choices()
-        board.look_at_newest(choices)
-        names = {key: entry.name for key, entry in choices.items()}
-        if names != self._names:
-            self._names = names
-            self._run.set_options(names, value=board.shown or None)
-        self._offer_others(choices)
-        chosen = choices.get(board.shown)
-        job = None if chosen is None else chosen.job
-        if board.shown != self._key or job is not self._watch.job:  # one after another in a folder
-            self._key = board.shown
-            self._run.value = board.shown or None
-            self._watch.show(chosen)
-        self._bar.refresh()
-        self._empty.set_visibility(not board.shown)
-        entry = self._watch.entry
-        self._download.set_visibility(entry is not None and entry.folder.is_dir())
-        failed = job is not None and job.state == JobState.FAILED
-        self._recover.set_visibility(failed and entry is not None and _left_log(entry.folder))
+        _offer(self._compare, others, board.compared if board.compared in others else NOTHING)
+        self._watch.show(choices.get(board.shown))
 
 
-def _left_log(folder: Path) -> bool:
-    """True if a run that was killed left the log of what it had simulated."""
-    return (folder / PARTS).is_dir()
-
-
-def _robot_of(entry: RunEntry) -> Robot | None:
-    """The robot of a run; None: it cannot be read any more."""
-    with suppress(CdprError, OSError):
-        scenario = entry.scenario()
-        return None if scenario is None else load_robot(scenario.robot)
-    return None
+def _offer(select: ui.select, options: Mapping[str, str], value: str | None) -> None:
+    """Changes options only where they are others: that closes a list that is unfolded."""
+    if select.options != options:
+        select.set_options(dict(options), value=value)
+    select.value = value
 
 
 def _subject_named(robot: str) -> Subject | None:

@@ -9,8 +9,12 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import write_asked
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
+<<<<<<< HEAD
 from cdpr_drake.studio.run import _boards, _scenes
 from cdpr_drake.studio.verb_panel import view_of
+=======
+from cdpr_drake.studio.run import _boards
+>>>>>>> runs-ready
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from cdpr_drake.studio.workspace import TAB, _views
 from tests.studio.pages import field, open_panel, problems, shown, until
@@ -150,7 +154,7 @@ async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, 
         assert bench.drawn.robot == ROBOT
         open_panel(user, "robot")
         await until(lambda: bench.drawn is None)
-        assert _scenes[bench]._scene is None
+        assert _boards[bench].scene.sample is None
         open_panel(user, "run")
     await until(lambda: bench.drawn is not None)
     open_panel(user, "robot")

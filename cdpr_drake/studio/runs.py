@@ -1,0 +1,321 @@
+"""Runs as a page shows them, live (`RunJob`) or finished (`FinishedRun`) alike, and their board.
+
+Both have `scenario`, and its robot as `subject`; `charts`, the time `end` [s], and `samples` as in
+`analyses.runs.steering`; `outcome` (running, converged, ...); and `at(time)`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import socket
+import zipfile
+import zlib
+from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
+from multiprocessing.connection import Connection
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.analyses.reporting.log_files import finite
+from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
+from cdpr_drake.analyses.runs.steering import Message, receive, send
+from cdpr_drake.arrays import Array
+from cdpr_drake.errors import OutputFolderError
+from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
+from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.boards import Board, Entry
+from cdpr_drake.studio.jobs import Job, JobManager, JobState
+from cdpr_drake.studio.plots import Chart, charts_of
+from cdpr_drake.studio.results import Subject, subject_of
+from cdpr_drake.studio.run_scene import RunScene
+from cdpr_drake.studio.workbench.scenario_draft import ScenarioDraft
+from cdpr_drake.systems.diagrams.load import load_scenario
+from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
+from cdpr_drake.systems.scenarios.files import check_moves_robot
+from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
+
+RUNS = "runs"
+"""Folder of results in the working folder, as that of `cdpr simulate`."""
+
+MOST_SAMPLES = 3000
+"""Samples of a run that are kept, or rows of a log, evenly spread."""
+
+LOG, SUMMARY, SCENARIO = "log.npz", "summary.json", "scenario.yaml"
+
+COLUMNS = (
+    "time", "X_WP", "X_WP_desired", "tensions", "lengths", "unstrained_lengths", "found"
+)  # fmt: skip
+"""Arrays of the log that are shown, besides marks of a camera."""
+
+Sample = dict[str, Any]
+
+
+class RunJob(Job):
+    """`cdpr simulate` of one scenario, with the same results as that command alone would write.
+
+    Attributes:
+        scenario: The scenario, if who began it has read it; `subject` likewise.
+        header: What it said at its beginning, see `analyses.runs.steering`; empty before.
+        samples: What it has shown so far, thinned where it is much, the newest the last.
+        events: What was done to it by hand, or refused, see `analyses.runs.steering`.
+        pace: If it is paused, and its speed, as it said last.
+    """
+
+    def __init__(
+        self, name: str, working: Path, folder: Path, *, settings: Sequence[str] = (),
+        speed: float | None = None, paused: bool = False,
+    ) -> None:  # fmt: skip
+        """Not begun; `settings` are items key=value that replace what the scenario's file says.
+
+        The speed is in simulated seconds per second, None: as fast as possible. If `paused`, it
+        stands at the start until it is told to go.
+        """
+        title = Path(name).stem if name.endswith((".yaml", ".yml")) else name
+        options = [f"--set={item}" for item in settings]
+        words = ["simulate", name, *options, f"--out={folder}", "--json"]
+        super().__init__(title, words, working, folder)
+        self.scenario: Any = None
+        self.subject: Subject | None = None
+        self.header: dict[str, Any] = {}
+        self.charts: tuple[Chart, ...] = ()
+        self.end = 0.0
+        self.samples: list[Sample] = []
+        self.events: list[dict[str, Any]] = []
+        self.pace: dict[str, Any] = {"paused": paused, "speed": speed}
+        self._image, self._count, self._stride = b"", 0, 1
+        self._connection: Connection | None = None
+
+    @property
+    def outcome(self) -> str:
+        """As in its newest sample; empty: there is none."""
+        return str(self.samples[-1]["outcome"]) if self.samples else ""
+
+    def at(self, time: float | None) -> tuple[Sample | None, bytes]:
+        """The newest sample, whatever the time, and the newest image as JPEG, if there are any."""
+        return self.samples[-1] if self.samples else None, self._image
+
+    def tell(self, what: str, **more: Any) -> None:
+        """Tells the run a message `do` of `analyses.runs.steering`: pause, go, step, break, ...
+
+        One that is queued remembers how it is to start.
+        """
+        if self._connection is not None:
+            with suppress(OSError):  # it has just ended
+                send(self._connection, Message("do", {"what": what, **more}))
+        elif what == "speed":
+            self.pace["speed"] = more["factor"]
+        elif what in ("pause", "go"):
+            self.pace["paused"] = what == "pause"
+
+    def take(self, message: Message) -> None:
+        """Keeps what the run shows."""
+        data = message.data
+        if message.kind == "begin":
+            self.header, self.end = data, float(data["duration"])
+            self.charts = charts_of(data["cables"], data["limits"])
+        elif message.kind == "sample":
+            self._take_sample(data)
+        elif message.kind == "image":
+            self._image = message.blob
+        elif message.kind == "event":
+            self.events.append(data)
+        elif message.kind == "pace":
+            self.pace = data
+            if self.state in (JobState.RUNNING, JobState.PAUSED):
+                self.set_state(JobState.PAUSED if data["paused"] else JobState.RUNNING)
+
+    def _take_sample(self, sample: Sample) -> None:
+        """Replaces the newest one, if that is between those that are kept."""
+        if self._count and (self._count - 1) % self._stride:
+            self.samples.pop()
+        self.samples.append(sample)
+        self._count += 1
+        if len(self.samples) > MOST_SAMPLES:
+            self.samples, self._stride = self.samples[::2], 2 * self._stride
+
+    def _hear(self, err: int) -> None:
+        super()._hear(err)
+        if self.samples:  # they say more
+            sample = self.samples[-1]
+            self.progress = min(sample["t"] / self.end, 1.0), _progress_words(sample)
+
+    async def _work(self) -> None:
+        ours, self._steering = socket.socketpair()
+        self._connection = connection = Connection(ours.detach())
+        self.tell("speed", factor=self.pace["speed"])
+        if self.pace["paused"]:
+            self.tell("pause")
+        loop = asyncio.get_running_loop()
+
+        def listen() -> None:
+            """Takes what the run shows, until it closes its end or sends no message."""
+            with suppress(EOFError, OSError, ValueError, RuntimeError):  # the loop is closed
+                while True:
+                    loop.call_soon_threadsafe(self.take, receive(connection))
+
+        Thread(target=listen, name=f"run {self.number}", daemon=True).start()
+        await super()._work()
+        self._connection = None
+
+
+def _progress_words(sample: Sample) -> str:
+    distance, angle = sample["position_error"], sample["rotation_error"]
+    if distance is None or angle is None:
+        return f"{sample['t']:.2f} s"
+    return f"{sample['t']:.2f} s, error {1e3 * distance:.2f} mm, {math.degrees(angle):.2f} deg"
+
+
+class FinishedRun:
+    """What a run left in a folder.
+
+    Attributes:
+        folder: The folder.
+        summary: Its summary.
+        times: Of the samples, which are rows of its log, shape (n,) [s].
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Reads it.
+
+        Raises:
+            OutputFolderError: It cannot be read.
+            CdprError: Its scenario is not accepted.
+        """
+        self.folder = folder
+        check_moves_robot(str(folder / SCENARIO), "the studio")
+        self.scenario = load_scenario(folder / SCENARIO)
+        robot = load_robot(self.scenario.robot)
+        self.subject = subject_of(robot)
+        cables = [cable.name for cable in robot.cables]
+        self.charts = charts_of(cables, shown_limits(self.scenario, robot))
+        self._model: ServoModel | None = None
+        self._mark = ""
+        if isinstance(self.scenario, Scenario):
+            self._model = servo_model(self.scenario, robot)
+            self._mark, self._picture = f"{self._model.target.mark}_px", MarksPicture(self._model)
+        try:
+            self.summary: dict[str, Any] = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
+            self.outcome = str(self.summary.get("outcome", ""))
+            with np.load(folder / LOG, allow_pickle=False) as log:
+                count = len(log["time"])
+                rows = np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int))
+                self._log: dict[str, Array] = {
+                    name: log[name][rows] for name in (*COLUMNS, self._mark) if name in log
+                }
+            self.times = self._log["time"]
+            self.end = float(self.times[-1])
+            self.samples = self._samples()
+        except (OSError, LookupError, ValueError, zipfile.BadZipFile, zlib.error) as problem:
+            raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
+
+    def at(self, time: float | None) -> tuple[Sample, bytes]:
+        """Sample nearest to a time [s], None: the end; and the camera's image, empty: no camera.
+
+        The image is drawn from the marks of the log, as JPEG.
+        """
+        row = int(np.argmin(np.abs(self.times - (self.end if time is None else time))))
+        if self._model is None:
+            return self.samples[row], b""
+        marks = self._log[self._mark][row] if self._log["found"][row, 0] > 0.0 else None
+        return self.samples[row], self._picture.jpeg(marks, None)
+
+    def _samples(self) -> list[Sample]:
+        log, model = self._log, self._model
+        if model is None:
+            distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
+        else:
+            pairs = zip(log["X_WP"], self.times, strict=True)
+            errors = [model.seen_error(pose_from_row(pose), float(time)) for pose, time in pairs]
+            distance, angle = np.array(errors).T
+        columns = {
+            "t": self.times, "position_error": distance, "rotation_error": angle,
+            "tensions": log["tensions"], "lengths": log["lengths"], "pose": log["X_WP"],
+            "unstrained": log.get("unstrained_lengths", np.full(len(self.times), None)),
+        }  # fmt: skip
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        return [finite(dict(zip(columns, row, strict=True))) for row in rows]
+
+
+def is_run(folder: Path) -> bool:
+    """True if a folder has the results of a run."""
+    return all((folder / name).is_file() for name in (LOG, SUMMARY, SCENARIO))
+
+
+def read_run(folder: Path) -> FinishedRun | None:
+    """The results in a folder, read once; None: there are none.
+
+    Raises:
+        CdprError: They cannot be read.
+    """
+    return _read(folder, (folder / LOG).stat().st_mtime_ns) if is_run(folder) else None
+
+
+@lru_cache(maxsize=4)
+def _read(folder: Path, written: int) -> FinishedRun:
+    return FinishedRun(folder)
+
+
+NO_RUN = RunJob("", Path(), Path())
+"""What is shown where nothing is."""
+
+RunEntry = Entry[RunJob]
+
+
+class RunBoard(Board[RunJob]):
+    """What the run panel of a session shows; all its tabs show the same.
+
+    Attributes:
+        scene: Draws the run that is shown.
+        draft: The scenario that is worked on; None: none was chosen.
+        compared: Key of the run behind the one that is shown; empty: none.
+        speed: Speed of the next run; None: as fast as possible.
+        cursor: Time that is looked at in a finished run [s]; None: its end.
+    """
+
+    def __init__(self, jobs: JobManager, root: Path) -> None:
+        """With the jobs of the server and the working folder."""
+        super().__init__(jobs, root, RUNS, RunJob, is_run)
+        self.scene = RunScene()
+        self.draft: ScenarioDraft | None = None
+        self.compared = ""
+        self.speed: float | None = 1.0
+        self.cursor: float | None = None
+
+    async def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
+        """Begins a run of the draft, perhaps standing at the start, and looks at it.
+
+        `by_hand`: cables can be broken and the platform pushed while it runs.
+
+        Raises:
+            CdprError: The draft is not accepted.
+        """
+        job = await asyncio.to_thread(self._job, paused, by_hand)
+        self._jobs.submit(job)
+        assert job.folder is not None
+        self.shown, self.cursor = job.folder.name, None
+        return job
+
+    def _job(self, paused: bool, by_hand: bool) -> RunJob:
+        """A run of the draft, which is read for that."""
+        draft = self.draft
+        assert draft is not None
+        scenario = draft.check()
+        job = RunJob(
+            draft.name, self._root, self._jobs.free_folder(self.folder / scenario.name),
+            settings=(*draft.settings(), *(draft.by_hand() if by_hand else ())),
+            speed=self.speed, paused=paused,
+        )  # fmt: skip
+        job.scenario, job.subject = scenario, subject_of(load_robot(scenario.robot))
+        return job
+
+    def recover(self, job: RunJob) -> None:
+        """Writes results of a run that was killed, as far as it was simulated."""
+        title = f"{job.title}: results of what there is"
+        words = ["finish", str(job.folder), "--json"]
+        self._jobs.submit(Job(title, words, self._root, job.folder))
