@@ -15,15 +15,11 @@ from typing import Any, Generic, TypeVar
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
-<<<<<<< HEAD
 from cdpr_drake.studio.verb_form import Verb
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 RESULTS = ("results.json", "summary.json")
 """Files that have a command's numbers; the first that is there."""
-=======
-from cdpr_drake.studio.workbench.command_form import CommandForm
->>>>>>> runs-ready
 
 MOST_FOLDERS = 200
 """Results folders that are offered, the newest ones."""
@@ -63,7 +59,6 @@ class Entry(Generic[J]):
     is_whole: bool = False
     changed: float = 0.0
 
-<<<<<<< HEAD
     def digest(self, robot: str) -> str:
         """Digest of the robot of a name, as it was when this was asked for; empty: not known."""
         return self.about.get("digest", "") if self.about.get("robot") == robot else ""
@@ -104,8 +99,6 @@ class VerbJob(Job):
             elif not folder.is_dir():
                 self._asked.unlink(missing_ok=True)
 
-=======
->>>>>>> runs-ready
 
 def write_asked(path: Path, words: Sequence[str], about: Mapping[str, str]) -> None:
     """Writes by which words a folder beside can go on, none if it is done, and on which robot."""
@@ -165,9 +158,8 @@ class Board(Generic[J]):
             folder = job.folder
             if isinstance(job, self._kind) and folder and folder.parent == self.folder:
                 there = self._left.get(folder.name) or Entry(folder)
-                asked = there.asked if job.state in (JobState.FAILED, JobState.STOPPED) else ()
                 name = f"{folder.name}, {job.state.value}"
-                entries.setdefault(folder.name, replace(there, name=name, job=job, asked=asked))
+                entries.setdefault(folder.name, replace(there, name=name, job=job))
         return entries | {key: one for key, one in self._left.items() if key not in entries}
 
     def shown_entry(self) -> Entry[J] | None:

@@ -90,16 +90,12 @@ class Job:
     program: Sequence[str] = COMMAND
 
     def __init__(
-        self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None, *,
-        done_with: Path | None = None,
-    ) -> None:  # fmt: skip
-        """Queued; arguments as the attributes, an option --json is up to the caller.
-
-        `done_with` is a file that is removed when the work is done, or left no folder.
-        """
+        self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None
+    ) -> None:
+        """Queued; arguments as the attributes, an option --json is up to the caller."""
         self.number = next(_numbers)
         self.title, self.arguments, self.working = title, tuple(arguments), working
-        self.folder, self._done_with = folder, done_with
+        self.folder = folder
         self.state, self.message = JobState.QUEUED, ""
         self.progress: tuple[float | None, str] = (None, "")
         self.lines: list[str] = []
@@ -216,9 +212,6 @@ class Job:
     def _end(self, code: int) -> None:
         """Says how it ended, by its exit code."""
         done, last = code in (0, INCOMPLETE, CLIENT_ENDED), self.lines[-1] if self.lines else ""
-        if self._done_with is not None and (done or not (self.folder and self.folder.is_dir())):
-            with suppress(OSError):
-                self._done_with.unlink(missing_ok=True)
         if done:
             self.progress = (1.0, "")
             self.set_state(JobState.FINISHED, reason(self.lines, code) if code and last else "")

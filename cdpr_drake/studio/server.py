@@ -23,12 +23,7 @@ from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
-<<<<<<< HEAD
-from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.verb_form import Verb
-=======
-from cdpr_drake.studio.workbench.command_form import CommandForm
->>>>>>> door-ready
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")

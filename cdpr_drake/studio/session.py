@@ -20,23 +20,10 @@ from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.calculator import Calculator, Latest, Signal, later
 from cdpr_drake.studio.jobs import JobManager
-<<<<<<< HEAD
-from cdpr_drake.studio.live_workspace import LiveWorkspace
-from cdpr_drake.studio.pose_answer import (
-    USUAL_METHOD,
-    PoseAnswer,
-    RobotQuestions,
-    axis_values,
-    pose_at,
-)
-from cdpr_drake.studio.results import Results, Subject, subject_of
-from cdpr_drake.studio.verb_form import Verb
-=======
 from cdpr_drake.studio.live_workspace import COARSE, LiveWorkspace, sketch_workspace
 from cdpr_drake.studio.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
 from cdpr_drake.studio.results import Results, Subject
-from cdpr_drake.studio.workbench.command_form import CommandForm
->>>>>>> poses-ready
+from cdpr_drake.studio.verb_form import Verb
 from cdpr_drake.studio.workbench.document import Document
 from cdpr_drake.studio.workbench.robot_files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder

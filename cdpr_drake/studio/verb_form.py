@@ -166,9 +166,7 @@ class Verb:
         """
         try:
             for word in words:
-                if not word.isprintable() or (
-                    self.writes_folder and word.partition("=")[0] in PLACES
-                ):
+                if self.writes_folder and word.partition("=")[0] in PLACES:
                     raise CdprError(f"found {word[:60]!r}; accepted: an option of the form")
                 refuse_outside(word, folder)
             self.check(words)

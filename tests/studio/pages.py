@@ -32,7 +32,7 @@ async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, their workbench and client."""
     calculator = Calculator()
     folder = WorkingFolder(folder)
-    bench = Workbench(folder, robot, calculator=calculator, commands=command_forms)
+    bench = Workbench(folder, robot, calculator=calculator, commands=verbs)
     try:
         async with simulated(make_page(lambda _: bench)) as user:
             await until(lambda: not _loading(user))
@@ -94,13 +94,6 @@ def _loading(user):
         return bool(list(ElementFilter(marker="panel-loading")))
 
 
-<<<<<<< HEAD
-def _bench(folder, robot, calculator):
-    return Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=verbs)
-
-
-=======
->>>>>>> door-ready
 async def until(condition, seconds=300.0):
     """Waits until something holds; kernels may have to be compiled first."""
     for _ in range(int(seconds / 0.02)):

@@ -48,7 +48,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert jobs.free_folder(first.folder).name == "some-2"
     await until(lambda: first.progress[0] is not None)  # it listens to SIGTERM then
     there = board.shown_entry()
-    assert (there.name, there.job, there.asked) == ("some, running", first, ())
+    assert (there.name, there.job) == ("some, running", first)
     with pytest.raises(CdprError, match="it works"):
         await board.go_on(there, every, folder)
     first.stop()
@@ -73,12 +73,31 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert board.choices()["some"].about == about
 
 
-async def test_what_leaves_no_folder_leaves_nothing(tmp_path, monkeypatch, every):
-    monkeypatch.setattr(Job, "program", (sys.executable, "-c", "raise SystemExit(2)"))
-    board = VerbBoard(JobManager(), tmp_path, "commands", VerbJob)
-    job = await board.start(every["tension"], ["tension", "--robot=planar"], "some", {})
+OWN = (
+    STEADY.partition("def stop")[0]
+    + """
+(folder / "results.json").write_text("own")
+print('{"printed": 1}')
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "files"),
+    [("raise SystemExit(2)", {}), (OWN, {"results.json": "own"})],
+    ids=["none", "own"],
+)
+async def test_what_leaves_no_folder_leaves_nothing_and_own_numbers_stay(
+    tmp_path, monkeypatch, every, program, files
+):
+    monkeypatch.setattr(Job, "program", (sys.executable, "-c", program))
+    board = VerbBoard(JobManager(), tmp_path, "workspaces", VerbJob)
+    job = await board.start(every["workspace"], ["workspace", "--robot=planar"], "some", {})
     assert await job.wait(LONGEST)
-    await until(lambda: list(board.folder.iterdir()) == [])
+    asked = board.folder / ".some.asked.json"
+    await until(lambda: not asked.exists() or json.loads(asked.read_text())["words"] == [])
+    assert asked.exists() == bool(files)
+    assert {path.name: path.read_text() for path in board.folder.glob("some/*")} == files
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from tests.studio.pages import opened_page, shown, until
 
 LATER = (
     "matplotlib", "cv2", "scipy.optimize", "scipy.spatial", "pydrake.systems.analysis",
-    "cdpr_drake.cli.command_forms", "cdpr_drake.analyses.visualization",
+    "cdpr_drake.studio.verb_panel", "cdpr_drake.analyses.visualization",
     "cdpr_drake.studio.workspace", "cdpr_drake.studio.run",
     "cdpr_drake.studio.scene", "cdpr_drake.analyses.tensions",
 )  # fmt: skip

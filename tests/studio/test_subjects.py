@@ -9,12 +9,8 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import write_asked
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
-<<<<<<< HEAD
-from cdpr_drake.studio.run import _boards, _scenes
-from cdpr_drake.studio.verb_panel import view_of
-=======
 from cdpr_drake.studio.run import _boards
->>>>>>> runs-ready
+from cdpr_drake.studio.verb_panel import view_of
 from cdpr_drake.studio.workbench.yaml_edit import with_value
 from cdpr_drake.studio.workspace import TAB, _views
 from tests.studio.pages import field, open_panel, problems, shown, until
