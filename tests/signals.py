@@ -149,16 +149,21 @@ def write_inputs(folder: Path) -> None:
 
 
 JOB = """
-import signal, sys
-signal.signal(signal.SIGINT, signal.SIG_DFL)
+import asyncio, signal, sys
 from pathlib import Path
-from cdpr_drake.studio.jobs import CommandJob
-job = CommandJob("a job", sys.argv[2:], Path.cwd())
-job.begin()
-Path(sys.argv[1]).write_text(str(job.process_id))
-while not job.state.is_over:
-    job.wait(1.0)
-print(job.state, *job.lines, sep="\\n", file=sys.stderr)
+from cdpr_drake.studio.jobs import Job
+
+async def main():
+    job = Job("a job", sys.argv[2:], Path.cwd())
+    job.begin()
+    while job._process is None:
+        await asyncio.sleep(0.01)
+    Path(sys.argv[1]).write_text(str(job._process.pid))
+    await job.wait()
+    print(job.state, *job.lines, sep="\\n", file=sys.stderr)
+
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+asyncio.run(main())
 """
 """A studio with one job, the number of whose process it writes to a file."""
 

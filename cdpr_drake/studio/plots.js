@@ -170,16 +170,9 @@ export default {
       if (this.span && this.cursorTime === null && last > this.span) return [last - this.span, last];
       return [0, last];
     },
-    visible(rows, times) {
-      if (!rows.length || times[0] <= rows[0][0]) return rows;
-      let low = 0;
-      let high = rows.length;
-      while (low < high) {
-        const middle = (low + high) >> 1;
-        if (rows[middle][0] < times[0]) low = middle + 1;
-        else high = middle;
-      }
-      return rows.slice(Math.max(low - 1, 0));
+    visible(rows, [start]) {
+      const first = rows.findIndex((row) => row[0] >= start);
+      return first > 0 ? rows.slice(first - 1) : rows;
     },
   },
 };

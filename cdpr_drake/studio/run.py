@@ -12,8 +12,8 @@ from nicegui import run, ui
 from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.panel import COMPARED, RUN, notify, on_page, robot_argument, show_errors
+from cdpr_drake.studio.jobs import Job, JobState
+from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
 from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import RunBoard
@@ -55,7 +55,6 @@ class RunPanel:
         """Places it into the current slot."""
         self._bench, self._board = bench, board
         self._form: ScenarioForm | None = None
-        self._shipped: tuple[str, ...] = ()
         self._watch = RunWatch(bench, board)
         ui.add_css(STYLE)
         with ui.element("div").classes("cdpr-run"):
@@ -70,7 +69,7 @@ class RunPanel:
 
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
-            self._scenario = ui.select([], label="scenario", with_input=True)
+            self._scenario = ui.select({}, label="scenario", with_input=True)
             self._scenario.props("dense outlined").classes("col").mark("scenario")
             self._scenario.on_value_change(self._choose_scenario)
             self._paused = ui.checkbox("start paused").mark("paused")
@@ -110,20 +109,15 @@ class RunPanel:
     async def _begin(self) -> None:
         """Offers scenarios, those of the working folder first."""
 
-        def scenarios() -> tuple[tuple[str, ...], list[str], str]:
-            folder, draft = self._bench.folder, self._board.draft
-            shipped = robot_scenario_names()
-            options = [*folder.files((".yaml", ".yml")), *shipped]
-            names = ["" if draft is None else draft.name, self._bench.scenario]
-            own = [
-                option for name in names for option in (name, folder.shown(Path(name).resolve()))
-            ]
-            return shipped, options, next((x for x in own if x in options), DEFAULT_SCENARIO)
+        def scenarios() -> tuple[dict[str, str], str]:
+            folder, draft, own = self._bench.folder, self._board.draft, self._bench.scenario
+            options = {str(folder.root / name): name for name in folder.files((".yaml", ".yml"))}
+            options |= {name: name for name in robot_scenario_names()}
+            names = (draft.name if draft else "", own, str(Path(own).resolve()))
+            return options, next((name for name in names if name in options), DEFAULT_SCENARIO)
 
-        offered = await run.io_bound(scenarios)
-        if offered is not None:  # the server is not ending
-            self._shipped, options, value = offered
-            self._scenario.set_options(options, value=value)
+        options, value = await run.io_bound(scenarios) or ({}, None)
+        self._scenario.set_options(options, value=value)
 
     async def _choose_scenario(self) -> None:
         """Shows the form of another scenario; changes of the same one are kept."""
@@ -131,7 +125,7 @@ class RunPanel:
 
         def read() -> ScenarioDraft:
             folder, draft = self._bench.folder, self._board.draft
-            file = name if name in self._shipped else str(folder.path(name))
+            file = str(folder.path(name)) if Path(name).is_absolute() else name
             return draft if draft and draft.name == file else ScenarioDraft(file, folder.root)
 
         self._body.clear()
@@ -165,21 +159,19 @@ class RunPanel:
 
     async def _open_own_robot(self) -> None:
         with show_errors():
-            if self._board.draft is not None:
-                opened = await run.io_bound(self._bench.files.open, self._board.draft.own_robot)
-                if opened is not None:  # the server is not ending
-                    self._bench.take_opened(opened)
+            assert self._board.draft is not None
+            opened = await run.io_bound(self._bench.files.open, self._board.draft.own_robot)
+            if opened is not None:  # the server is not ending
+                self._bench.take_opened(opened)
 
     async def _start(self) -> None:
         self._start_button.props("loading")
         with show_errors():
             if self._form is not None and await self._form.check():
-                if await self._take_robot():
-                    paused, by_hand = bool(self._paused.value), bool(self._by_hand.value)
-                    await self._board.start(paused=paused, by_hand=by_hand)
-                    self._refresh()
-                else:
-                    notify(self._which.text)
+                if not await self._take_robot():
+                    raise CdprError(self._which.text)
+                await self._board.start(paused=self._paused.value, by_hand=self._by_hand.value)
+                self._refresh()
         self._start_button.props(remove="loading")
 
     def _choose_run(self) -> None:
@@ -192,13 +184,17 @@ class RunPanel:
 
     def _can_recover(self, files: frozenset[str]) -> bool:
         """True if a run that was killed left the log of what it had simulated."""
-        job = self._watch.job
-        return job is not None and job.state == JobState.FAILED and PARTS in files
+        return self._watch.job.state == JobState.FAILED and PARTS in files
 
     def _recover(self) -> None:
+        """Writes results of a run that was killed, as far as it was simulated."""
+        job = self._watch.job
+        words, title = (
+            ["finish", str(job.folder), "--json"],
+            f"{job.title}: results of what there is",
+        )
         with show_errors():
-            if self._watch.job is not None:
-                self._board.recover(self._watch.job)
+            self._bench.jobs.submit(Job(title, words, job.working, job.folder))
 
     async def _download(self) -> None:
         if self._watch.entry is not None:

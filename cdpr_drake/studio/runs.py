@@ -262,7 +262,8 @@ def _read(folder: Path, written: int) -> FinishedRun:
 
 
 NO_RUN = RunJob("", Path(), Path())
-"""What is shown where nothing is."""
+NO_RUN.state = JobState.FINISHED
+"""What is shown where nothing is, and nobody works."""
 
 RunEntry = Entry[RunJob]
 
@@ -313,9 +314,3 @@ class RunBoard(Board[RunJob]):
         )  # fmt: skip
         job.scenario, job.subject = scenario, subject_of(load_robot(scenario.robot))
         return job
-
-    def recover(self, job: RunJob) -> None:
-        """Writes results of a run that was killed, as far as it was simulated."""
-        title = f"{job.title}: results of what there is"
-        words = ["finish", str(job.folder), "--json"]
-        self._jobs.submit(Job(title, words, self._root, job.folder))

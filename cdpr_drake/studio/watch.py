@@ -84,22 +84,16 @@ class RunWatch:
         self._jpeg, self._time_sent = b"", -math.inf  # the newest that the browser has
 
     @property
-    def job(self) -> RunJob | None:
+    def job(self) -> RunJob:
         """The job of the run, as long as the server has it."""
-        return None if self.entry is None else self.entry.job
-
-    @property
-    def is_over(self) -> bool:
-        """True if nobody works on the run."""
-        return self.job is None or self.job.state.is_over
+        return (self.entry and self.entry.job) or NO_RUN
 
     def place_steering(self) -> None:
         """Places speed, pause, go, step and stop into the current slot."""
 
         def set_speed() -> None:
             self._board.speed = SPEEDS[str(speed.value)]
-            if self.job is not None:
-                self.job.tell("speed", factor=self._board.speed)
+            self.job.tell("speed", factor=self._board.speed)
 
         names = {factor: words for words, factor in SPEEDS.items()}
         speed = ui.select([*SPEEDS], value=names[self._board.speed], label="speed")
@@ -113,15 +107,10 @@ class RunWatch:
         self, words: str, icon: str, act: Callable[[RunJob], None], takes: Callable[[RunJob], bool]
     ) -> ui.button:
         """A button that does something to a run that works, as long as that takes it."""
-
-        def do() -> None:
-            if self.job is not None:
-                act(self.job)
-
-        def works(job: RunJob | None) -> bool:
-            return job is not None and job.state in WORKING and takes(job)
-
-        return ui.button(words, icon=icon, on_click=do).bind_enabled_from(self, "job", works)
+        button = ui.button(words, icon=icon, on_click=lambda: act(self.job))
+        return button.bind_enabled_from(
+            self, "job", lambda job: job.state in WORKING and takes(job)
+        )
 
     def _place_hands(self) -> None:
         """Places buttons that break a cable or push the platform, and what was done so."""
@@ -155,7 +144,7 @@ class RunWatch:
         force.classes("w-24").mark("push-force")
         time.classes("w-24").mark("push-time")
         done.bind_text_from(self, "job", _done_by_hand)
-        box.bind_visibility_from(self, "job", lambda job: bool(job and job.header.get("takes")))
+        box.bind_visibility_from(self, "job", lambda job: bool(job.header.get("takes")))
 
     def place(self) -> None:
         """Places the run into the current slot."""
@@ -187,14 +176,16 @@ class RunWatch:
         self._both.mark("both-runs")
         self._fold.classes("w-full studio-group").mark("run-results")
         self._fold.on_value_change(self._fill_results)
-        self._fold.bind_visibility_from(self, "files", lambda files: bool(files) and self.is_over)
+        self._fold.bind_visibility_from(
+            self, "files", lambda files: bool(files) and self.job.state.is_over
+        )
 
     def show(self, entry: RunEntry | None) -> None:
         """Shows another run; all of the one before is forgotten."""
         same = _identity(entry) == _identity(self.entry)
         self.entry = entry
         if not same:
-            self.run, self.files, self._is_unreadable = self.job or NO_RUN, frozenset(), False
+            self.run, self.files, self._is_unreadable = self.job, frozenset(), False
             self._fold.value = False
             self._results.clear()
             self._begin()
@@ -245,7 +236,8 @@ class RunWatch:
             return
         self._offer_cables()
         self.files = await run.io_bound(_names, entry.folder) or frozenset()
-        if self.is_over and not isinstance(self.run, FinishedRun) and not self._is_unreadable:
+        is_read = self._is_unreadable or isinstance(self.run, FinishedRun)
+        if self.job.state.is_over and not is_read:
             try:
                 done = await run.io_bound(read_run, entry.folder)
             except Exception:
@@ -292,9 +284,9 @@ class RunWatch:
 
     def _offer_cables(self) -> None:
         """Offers the cables that are not broken."""
-        names = [] if self.job is None else self.job.header.get("cables", [])
-        broken = {} if self.job is None else {event.get("cable") for event in self.job.events}
-        left = {k: name for k, name in enumerate(names) if k not in broken}
+        broken = {event.get("cable") for event in self.job.events}
+        names = enumerate(self.job.header.get("cables", ()))
+        left = {k: name for k, name in names if k not in broken}
         if left != self._cable.options:
             value = self._cable.value if self._cable.value in left else next(iter(left), None)
             self._cable.set_options(left, value=value)
@@ -302,8 +294,8 @@ class RunWatch:
     def _say(self) -> None:
         """State, outcome and progress in words."""
         job = self.job
-        fraction, words = (None, "") if job is None else job.progress
-        if job is not None:
+        fraction, words = job.progress
+        if job is not NO_RUN:
             starts = job.state == JobState.RUNNING and not job.header
             state = "starting" if starts else job.state.value
             words = job.message or words
@@ -315,7 +307,7 @@ class RunWatch:
         self._state.text, self._outcome.text = state, self.run.outcome.replace("_", " ")
         self._words.text, self._problem.text = ("", words) if failed else (words, "")
         self._problem.visible = failed
-        self._bar.visible = state == READING or not self.is_over
+        self._bar.visible = state == READING or not job.state.is_over
         self._bar.value = fraction or 0.0
         if self._bar.props.get("indeterminate", False) != (fraction is None):
             self._bar.props.set_bool("indeterminate", fraction is None)
@@ -344,10 +336,9 @@ def _names(folder: Path) -> frozenset[str]:
     return frozenset()
 
 
-def _done_by_hand(job: RunJob | None) -> str:
+def _done_by_hand(job: RunJob) -> str:
     """What was done to a run, or refused."""
-    events = [] if job is None else job.events
     return "; ".join(
         f"{event['t']:.2f} s: {event.get('words') or 'refused: ' + event['refused']}"
-        for event in events
+        for event in job.events
     )

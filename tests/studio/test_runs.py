@@ -190,10 +190,10 @@ async def test_a_finished_run_is_looked_at_compared_and_downloaded(
 async def test_buttons_break_and_push_and_the_scenario_keeps_it(
     user, bench, folder, monkeypatch, alone
 ):
-    write_scenario(folder, **{"duration: 30.0": "duration: 0.5"})
+    file = write_scenario(folder, **{"duration: 30.0": "duration: 0.5"})
     await user.open("/")
-    await until(lambda: "acrobot_pbvs.yaml" in field(user, "scenario").options)
-    field(user, "scenario").value = "acrobot_pbvs.yaml"
+    await until(lambda: str(file) in field(user, "scenario").options)
+    field(user, "scenario").value = str(file)
     await until(lambda: not field(user, "start").enabled)
     field(user, "paused").value = field(user, "by-hand").value = True
     await press(user, "start")
