@@ -13,10 +13,9 @@ from pathlib import Path
 from nicegui import app, background_tasks, ui
 from nicegui.server import Server
 
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.door import TOKEN, Door, Sessions
 from cdpr_drake.studio.jobs import JobManager
@@ -83,18 +82,18 @@ def serve(
     name, bound = (socket.gethostname(), "0.0.0.0") if is_everywhere else (host, host)
     port = _free_port(bound, port)
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
-    said = f"{address} , with the token that was set ;"
-    if token is None:
-        token = secrets.token_urlsafe(32)
-        said = f"{address}?{TOKEN}={token} ;"
-    elif not token:
-        said = f"{address} , without a token: every program and user of this machine may open it ;"
-    page = f"{address}?{TOKEN}={token}" if token else address
+    said, secret = f"{address} , with the token that was set", token
+    if token == "":
+        said = f"{address} , without a token: every program and user of this machine may open it"
+    elif token is None:
+        secret = secrets.token_urlsafe(32)
+        said = f"{address}?{TOKEN}={secret}"
+    page = f"{address}?{TOKEN}={secret}" if secret else address
 
     async def announce() -> None:
         while not Server.instance.started:  # the port is open only then
             await asyncio.sleep(POLL)
-        print(f"cdpr studio at {said} Ctrl-C ends", flush=True)
+        print(f"cdpr studio at {said} ; Ctrl-C ends", flush=True)
         ready(page)
 
     async def end() -> None:
@@ -104,24 +103,17 @@ def serve(
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
     add_scene_relay(app)
-    put_before_all(host, token, port, Sessions(make))
+    # Also before what NiceGUI puts round it, which lets browsers keep its files, whatever they are.
+    build, sessions = app.build_middleware_stack, Sessions(make)
+    app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
+        build(), host, secret or "", port, sessions.bench
+    )
     app.config.quasar_config["loadingBar"] = {"skipHijack": True}  # it has no name to be read aloud
     ui.run(
         make_page(), host=bound, port=port, title="cdpr studio", language="en-US", dark=None,
         show=False, reload=False, show_welcome_message=False, access_log=False,
         reconnect_timeout=LONGEST_ABSENCE,
     )  # fmt: skip
-
-
-def put_before_all(host: str, token: str, port: int, sessions: Sessions) -> None:
-    """Puts the door before the whole application, also before what NiceGUI puts round it.
-
-    That lets browsers keep its files for a year, whatever the answer was.
-    """
-    build = app.build_middleware_stack
-    app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
-        build(), host, token, port, sessions.bench
-    )
 
 
 def _opened(name: str | None) -> tuple[str, str]:
@@ -134,25 +126,16 @@ def _opened(name: str | None) -> tuple[str, str]:
         return name or USUAL_ROBOT, ""
     # A second of the start, which who opens a robot of the package need not wait for.
     from cdpr_drake.systems.diagrams.load import load_scenario
-    from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_names
+    from cdpr_drake.systems.scenarios import files
 
-    if name in scenario_names() or _is_scenario(Path(name)):
-        check_moves_robot(name, "cdpr studio")
-        return str(load_scenario(name).robot), name
-    return name, ""
-
-
-def _is_scenario(path: Path) -> bool:
-    """Whether a file is a scenario, or a folder the results of one."""
-    if path.is_dir():
-        return (path / "scenario.yaml").is_file()
-    if path.suffix.lower() not in (".yaml", ".yml") or too_many_bytes(path):
-        return False
     try:
-        content = load_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False  # the reader of robots says what is wrong
-    return isinstance(content, dict) and "robot" in content
+        file = files.scenario_file(name)
+    except ScenarioError:  # the reader of robots says what is wrong
+        return name, ""
+    if name not in files.scenario_names() and files.top_word(file, "robot") is None:
+        return name, ""
+    files.check_moves_robot(name, "cdpr studio")
+    return str(load_scenario(name).robot), name
 
 
 def _free_port(host: str, port: int) -> int:
