@@ -19,8 +19,10 @@ from nicegui import events, ui
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.door import BENCH
 from cdpr_drake.studio.panel import PANELS, on_page, place_remarks, show_errors
-from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.session import Workbench
+
+SCENE = "/scene/"
+"""Where the server relays the scene of a session to."""
 
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 

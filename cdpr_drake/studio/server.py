@@ -7,26 +7,34 @@ import re
 import secrets
 import socket
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
+import aiohttp
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from nicegui import app, background_tasks, ui
 from nicegui.server import Server
+from starlette.requests import HTTPConnection
 
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.calculator import Calculator
-from cdpr_drake.studio.door import TOKEN, Door, Sessions
+from cdpr_drake.studio.door import BENCH, TOKEN, Door, Sessions
 from cdpr_drake.studio.jobs import JobManager
-from cdpr_drake.studio.page import make_page
-from cdpr_drake.studio.scene_relay import add_scene_relay
+from cdpr_drake.studio.page import SCENE, make_page
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.workbench.command_form import CommandForm
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")
 """What is accepted as a token, which has to stand in an address as it is."""
+
+LARGEST_MESSAGE = 64_000_000
+"""Of a scene [bytes]; meshes come in one message."""
+
+STYLE, SCRIPT = ((Path(__file__).parent / name).read_bytes() for name in ("scene.css", "scene.js"))
+TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
@@ -102,7 +110,7 @@ def serve(
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
-    add_scene_relay(app)
+    _relay_scene(app)
     # Also before what NiceGUI puts round it, which lets browsers keep its files, whatever they are.
     build, sessions = app.build_middleware_stack, Sessions(make)
     app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
@@ -156,3 +164,56 @@ def _free_port(host: str, port: int) -> int:
             f"--host, --port: {host} cannot listen at {port}: {why}; accepted: a name or address "
             "of this machine, * for all, and a port that is free"
         ) from problem
+
+
+def _relay_scene(app: FastAPI) -> None:
+    """Adds the routes below `SCENE`, which relay Drake's Meshcat behind the door.
+
+    Meshcat knows neither tokens nor sessions, so that nobody but this relay reaches it: the scene
+    is behind a socket of the file system, for this user alone. What a browser says is dropped,
+    since Drake ends the process at a message that it cannot read.
+    """
+
+    @app.get(SCENE + "{name:path}", include_in_schema=False)
+    async def asset(request: Request, name: str) -> Response:
+        page = name or "meshcat.html"
+        async with await _scene(request) as scene, scene.get(f"http://scene/{page}") as answer:
+            body = await answer.read()
+        if page == "meshcat.html":
+            body = body.replace(b"</head>", b"<style>" + STYLE + b"</style></head>", 1)
+            body = body.replace(b"</body>", b"<script>" + SCRIPT + b"</script></body>", 1)
+        kind = TYPES.get(Path(page).suffix, "application/octet-stream")
+        return Response(body, answer.status, media_type=kind)
+
+    @app.websocket(SCENE)
+    async def messages(socket: WebSocket) -> None:
+        await socket.accept()
+
+        async def down() -> None:
+            async with (
+                await _scene(socket) as scene,
+                scene.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
+            ):
+                async for message in meshcat:
+                    if message.type == aiohttp.WSMsgType.BINARY:
+                        await socket.send_bytes(message.data)
+
+        async def up() -> None:
+            while (await socket.receive())["type"] != "websocket.disconnect":
+                pass
+
+        both = [asyncio.create_task(down()), asyncio.create_task(up())]
+        try:
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in both:
+                task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
+        with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
+            await socket.close()
+
+
+async def _scene(request: HTTPConnection) -> aiohttp.ClientSession:
+    """What asks the scene of a request's session; who goes away does not end its making."""
+    path = await asyncio.shield(asyncio.wrap_future(request.scope[BENCH].scene_address()))
+    return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path))

@@ -10,7 +10,7 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.door import BENCH, MOST_SESSIONS, Door, Sessions
-from cdpr_drake.studio.scene_relay import SCENE
+from cdpr_drake.studio.page import SCENE
 from cdpr_drake.studio.server import IS_TOKEN, serve
 from tests.messages import printed
 from tests.studio.pages import until
