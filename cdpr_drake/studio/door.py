@@ -38,8 +38,8 @@ TOKEN, ASKED = "token", "cookie"
 BENCH = "cdpr_studio_bench"
 """Key of the scope of a request that was let through: the workbench of its session."""
 
-MOST_SESSIONS = 24
-"""Workbenches that are kept, of those used last, beside those that a page shows."""
+MOST_SESSIONS = 8
+"""Workbenches that are kept, those used last, beside all that a page shows; 10 MB each."""
 
 PRINTED = "open the address that cdpr studio has printed when it started, with cookies allowed"
 NO_STORE = {"cache-control": "no-store"}

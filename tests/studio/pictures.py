@@ -85,11 +85,12 @@ def look(page: Any, size: str, dark: bool, height: int = 0) -> None:
 
 def fill(folder: Path) -> None:
     """A run, its log beside the model of its robot, a workspace and a study."""
-    for words in (
-        ["workspace", "acrobot_small", "--grid=9,9,9", f"--out={folder / 'workspaces' / 'small'}"],
-        ["study", "tension-methods", "--quick", f"--out={folder / 'studies' / 'tension-methods'}"],
-    ):
-        subprocess.run([sys.executable, "-m", "cdpr_drake", *words], check=True)
+    words = ["workspace", "acrobot_small", "--grid=9,9,9", f"--out={folder / 'workspaces/small'}"]
+    subprocess.run([sys.executable, "-m", "cdpr_drake", *words], check=True)
+    study = folder / "studies" / "tension-methods"
+    study.mkdir(parents=True)
+    said = {"words": "methods agree", "printed": "1", "found": "1", "verdict": "confirmed"}
+    (study / "results.json").write_text(json.dumps({"study": "x", "statements": [said]}))
     run = folder / "runs" / "acrobot_pbvs"
     scenario = load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"])
     simulate(scenario, folder=run)
