@@ -59,7 +59,8 @@ COLOURED = 800
 CHOOSE = """
 const of = (e) => e.querySelector('.q-field__label')?.innerText;
 const field = [...document.querySelectorAll('.q-tab-panel .q-select')].find(
-    e => ['results', 'run'].includes(of(e)) && e.querySelector('input')?.value === '');
+    e => ['results', 'run'].includes(of(e)) && !e.querySelector('.q-field__native').innerText &&
+        !e.querySelector('input')?.value);
 if (!field) return;
 field.querySelector('.q-field__append').click();
 setTimeout(() => document.querySelector('.q-menu .q-item')?.click(), 800);
