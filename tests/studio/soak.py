@@ -151,7 +151,7 @@ def request_all(address: str, seconds: float, found: Counter[str]) -> None:
             answer = connection.getresponse()
             body = answer.read().decode(errors="replace")
             found[f"HTTP {answer.status}"] += 1
-            cookie = (answer.headers["Set-Cookie"] or cookie).partition(";")[0]
+            cookie = cookie or (answer.headers["Set-Cookie"] or "").partition(";")[0]
             if path == "/" and answer.status == 200 and len(paths) < 12:
                 paths += [x.partition('"')[0] for x in body.split('="')[1:] if x[0] == "/"]
         except OSError as problem:
