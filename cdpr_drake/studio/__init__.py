@@ -1,7 +1,7 @@
 """The studio: a local web page for robots, poses, workspaces, runs and studies.
 
 `serve` starts it. `server` starts NiceGUI behind a `Door`, which asks for a cookie that whoever has
-the token gets, and tells sessions by it; `scene_relay` relays Drake's Meshcat to the same address.
+the token gets, and tells sessions by it; Drake's Meshcat is relayed to the same address.
 `page` is the page, `panel` the table of its panels with what connects them to a workbench.
 `session` is what a browser session works on. `robot`, `pose`, `workspace`, `run`, `logs` and
 `studies` are the panels.

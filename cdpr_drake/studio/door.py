@@ -38,8 +38,8 @@ TOKEN, ASKED = "token", "cookie"
 BENCH = "cdpr_studio_bench"
 """Key of the scope of a request that was let through: the workbench of its session."""
 
-MOST_SESSIONS = 24
-"""Workbenches that are kept, of those used last, beside those that a page shows."""
+MOST_SESSIONS = 8
+"""Workbenches that are kept, those used last, beside all that a page shows; 10 MB each."""
 
 PRINTED = "open the address that cdpr studio has printed when it started, with cookies allowed"
 NO_STORE = {"cache-control": "no-store"}
@@ -134,11 +134,12 @@ class Door:
 
     def _hands_cookie(self, request: HTTPConnection, session: str) -> bool:
         """Whether a request is answered with a cookie, or with an address without the token."""
-        if request.scope["type"] != "http" or request.scope["method"] != "GET":
+        scope, query = request.scope, request.query_params
+        if scope["type"] != "http" or scope["method"] != "GET":
             return False
         if self._token:
-            return TOKEN in request.query_params
-        return not session and request.scope["path"] == "/" and ASKED not in request.query_params
+            return TOKEN in query
+        return not session and scope["path"] == "/" and ASKED not in query
 
     def _cookie_page(self, request: HTTPConnection, session: str) -> HTMLResponse:
         """A page that goes on by itself to the address without the token, with a cookie.

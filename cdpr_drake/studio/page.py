@@ -19,20 +19,19 @@ from nicegui import events, ui
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.door import BENCH
 from cdpr_drake.studio.panel import PANELS, on_page, place_remarks, show_errors
-from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.session import Workbench
+
+SCENE = "/scene/"
+"""Where the server relays the scene of a session to."""
 
 PREFERS_DARK = "return window.matchMedia('(prefers-color-scheme: dark)').matches"
 
-PALETTE = {f"--studio-color-{k}": color for k, color in enumerate(COLORS)} | {
-    "--studio-slack": SLACK
-}
+PALETTE = {f"--studio-color-{k}": color for k, color in enumerate(COLORS)}
+PALETTE["--studio-slack"] = SLACK
 """The package's colours, by their names in style sheets."""
 
-STYLE = (
-    ":root { " + " ".join(f"{name}: {color};" for name, color in PALETTE.items()) + " }\n"
-    + (Path(__file__).parent / "studio.css").read_text(encoding="utf-8")
-)  # fmt: skip
+STYLE = "".join(f":root {{ {name}: {color}; }}\n" for name, color in PALETTE.items())
+STYLE += (Path(__file__).parent / "studio.css").read_text(encoding="utf-8")
 
 BETWEEN = 0.02
 """Between two panels that are placed, for what the browser asks meanwhile [s]."""
@@ -110,13 +109,15 @@ def _place_state(bench: Workbench) -> None:
 
 def _press(bench: Workbench, event: events.KeyEventArguments) -> None:
     """Ctrl-Z, Ctrl-Y and Ctrl-Shift-Z in every tab, but in fields, which have their own."""
-    if event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta):
-        key = str(event.key).lower()
+    key = str(event.key).lower()
+    if (
+        event.action.keydown
+        and (event.modifiers.ctrl or event.modifiers.meta)
+        and key in ("y", "z")
+    ):
+        is_undo = key == "z" and not event.modifiers.shift
         with show_errors():
-            if key == "y" or (key == "z" and event.modifiers.shift):
-                bench.robot.redo()
-            elif key == "z":
-                bench.robot.undo()
+            (bench.robot.undo if is_undo else bench.robot.redo)()
 
 
 def _place_panels(bench: Workbench, tabs: ui.tabs) -> None:

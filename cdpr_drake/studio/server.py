@@ -7,27 +7,34 @@ import re
 import secrets
 import socket
 from collections.abc import Callable, Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from pathlib import Path
 
+import aiohttp
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
 from nicegui import app, background_tasks, ui
 from nicegui.server import Server
+from starlette.requests import HTTPConnection
 
-from cdpr_drake.errors import CdprError
+from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.schema.yaml_files import load_yaml, too_many_bytes
 from cdpr_drake.studio.calculator import Calculator
-from cdpr_drake.studio.door import TOKEN, Door, Sessions
+from cdpr_drake.studio.door import BENCH, TOKEN, Door, Sessions
 from cdpr_drake.studio.jobs import JobManager
-from cdpr_drake.studio.page import make_page
-from cdpr_drake.studio.scene_relay import add_scene_relay
+from cdpr_drake.studio.page import SCENE, make_page
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.verb_form import Verb
 from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")
 """What is accepted as a token, which has to stand in an address as it is."""
+
+LARGEST_MESSAGE = 64_000_000
+"""Of a scene [bytes]; meshes come in one message."""
+
+STYLE, SCRIPT = ((Path(__file__).parent / name).read_bytes() for name in ("scene.css", "scene.js"))
+TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""
@@ -83,18 +90,18 @@ def serve(
     name, bound = (socket.gethostname(), "0.0.0.0") if is_everywhere else (host, host)
     port = _free_port(bound, port)
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
-    said = f"{address} , with the token that was set ;"
-    if token is None:
-        token = secrets.token_urlsafe(32)
-        said = f"{address}?{TOKEN}={token} ;"
-    elif not token:
-        said = f"{address} , without a token: every program and user of this machine may open it ;"
-    page = f"{address}?{TOKEN}={token}" if token else address
+    said, secret = f"{address} , with the token that was set", token
+    if token == "":
+        said = f"{address} , without a token: every program and user of this machine may open it"
+    elif token is None:
+        secret = secrets.token_urlsafe(32)
+        said = f"{address}?{TOKEN}={secret}"
+    page = f"{address}?{TOKEN}={secret}" if secret else address
 
     async def announce() -> None:
         while not Server.instance.started:  # the port is open only then
             await asyncio.sleep(POLL)
-        print(f"cdpr studio at {said} Ctrl-C ends", flush=True)
+        print(f"cdpr studio at {said} ; Ctrl-C ends", flush=True)
         ready(page)
 
     async def end() -> None:
@@ -103,25 +110,18 @@ def serve(
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)
-    add_scene_relay(app)
-    put_before_all(host, token, port, Sessions(make))
+    _relay_scene(app)
+    # Also before what NiceGUI puts round it, which lets browsers keep its files, whatever they are.
+    build, sessions = app.build_middleware_stack, Sessions(make)
+    app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
+        build(), host, secret or "", port, sessions.bench
+    )
     app.config.quasar_config["loadingBar"] = {"skipHijack": True}  # it has no name to be read aloud
     ui.run(
         make_page(), host=bound, port=port, title="cdpr studio", language="en-US", dark=None,
         show=False, reload=False, show_welcome_message=False, access_log=False,
         reconnect_timeout=LONGEST_ABSENCE,
     )  # fmt: skip
-
-
-def put_before_all(host: str, token: str, port: int, sessions: Sessions) -> None:
-    """Puts the door before the whole application, also before what NiceGUI puts round it.
-
-    That lets browsers keep its files for a year, whatever the answer was.
-    """
-    build = app.build_middleware_stack
-    app.build_middleware_stack = lambda: Door(  # type: ignore[method-assign]
-        build(), host, token, port, sessions.bench
-    )
 
 
 def _opened(name: str | None) -> tuple[str, str]:
@@ -134,25 +134,16 @@ def _opened(name: str | None) -> tuple[str, str]:
         return name or USUAL_ROBOT, ""
     # A second of the start, which who opens a robot of the package need not wait for.
     from cdpr_drake.systems.diagrams.load import load_scenario
-    from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_names
+    from cdpr_drake.systems.scenarios import files
 
-    if name in scenario_names() or _is_scenario(Path(name)):
-        check_moves_robot(name, "cdpr studio")
-        return str(load_scenario(name).robot), name
-    return name, ""
-
-
-def _is_scenario(path: Path) -> bool:
-    """Whether a file is a scenario, or a folder the results of one."""
-    if path.is_dir():
-        return (path / "scenario.yaml").is_file()
-    if path.suffix.lower() not in (".yaml", ".yml") or too_many_bytes(path):
-        return False
     try:
-        content = load_yaml(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False  # the reader of robots says what is wrong
-    return isinstance(content, dict) and "robot" in content
+        file = files.scenario_file(name)
+    except ScenarioError:  # the reader of robots says what is wrong
+        return name, ""
+    if name not in files.scenario_names() and files.top_word(file, "robot") is None:
+        return name, ""
+    files.check_moves_robot(name, "cdpr studio")
+    return str(load_scenario(name).robot), name
 
 
 def _free_port(host: str, port: int) -> int:
@@ -173,3 +164,56 @@ def _free_port(host: str, port: int) -> int:
             f"--host, --port: {host} cannot listen at {port}: {why}; accepted: a name or address "
             "of this machine, * for all, and a port that is free"
         ) from problem
+
+
+def _relay_scene(app: FastAPI) -> None:
+    """Adds the routes below `SCENE`, which relay Drake's Meshcat behind the door.
+
+    Meshcat knows neither tokens nor sessions, so that nobody but this relay reaches it: the scene
+    is behind a socket of the file system, for this user alone. What a browser says is dropped,
+    since Drake ends the process at a message that it cannot read.
+    """
+
+    @app.get(SCENE + "{name:path}", include_in_schema=False)
+    async def asset(request: Request, name: str) -> Response:
+        page = name or "meshcat.html"
+        async with await _scene(request) as scene, scene.get(f"http://scene/{page}") as answer:
+            body = await answer.read()
+        if page == "meshcat.html":
+            body = body.replace(b"</head>", b"<style>" + STYLE + b"</style></head>", 1)
+            body = body.replace(b"</body>", b"<script>" + SCRIPT + b"</script></body>", 1)
+        kind = TYPES.get(Path(page).suffix, "application/octet-stream")
+        return Response(body, answer.status, media_type=kind)
+
+    @app.websocket(SCENE)
+    async def messages(socket: WebSocket) -> None:
+        await socket.accept()
+
+        async def down() -> None:
+            async with (
+                await _scene(socket) as scene,
+                scene.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
+            ):
+                async for message in meshcat:
+                    if message.type == aiohttp.WSMsgType.BINARY:
+                        await socket.send_bytes(message.data)
+
+        async def up() -> None:
+            while (await socket.receive())["type"] != "websocket.disconnect":
+                pass
+
+        both = [asyncio.create_task(down()), asyncio.create_task(up())]
+        try:
+            await asyncio.wait(both, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in both:
+                task.cancel()
+            await asyncio.gather(*both, return_exceptions=True)
+        with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
+            await socket.close()
+
+
+async def _scene(request: HTTPConnection) -> aiohttp.ClientSession:
+    """What asks the scene of a request's session; who goes away does not end its making."""
+    path = await asyncio.shield(asyncio.wrap_future(request.scope[BENCH].scene_address()))
+    return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path))

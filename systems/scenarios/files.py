@@ -119,7 +119,7 @@ def scenario_kind(name: str) -> str:
         ScenarioError: Unknown scenario or kind.
     """
     path = scenario_file(name)
-    value = _scalar(path, "kind")
+    value = top_word(path, "kind")
     if value is None:
         return VISUAL_SERVO
     if value.value not in KINDS:
@@ -130,7 +130,7 @@ def scenario_kind(name: str) -> str:
     return str(value.value)
 
 
-def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
+def top_word(path: Path, key: str) -> yaml.ScalarNode | None:
     """A word or number at the top of a file; None where it is not there or cannot be read."""
     try:
         if too_many_bytes(path):
@@ -146,7 +146,7 @@ def _scalar(path: Path, key: str) -> yaml.ScalarNode | None:
 
 def unknown_robot(path: Path, overrides: Sequence[str]) -> tuple[str, ...]:
     """What is wrong with the robot's name in a file that has other problems; often nothing."""
-    value = _scalar(path, "robot")
+    value = top_word(path, "robot")
     if value is None or any(item.partition("=")[0].strip() == "robot" for item in overrides):
         return ()
     try:

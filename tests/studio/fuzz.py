@@ -1,5 +1,7 @@
 """Wrong values and files through the page's handlers: a message each, never a dead server.
 
+Also so many hostile messages each to the door, scene and sockets of a server, see `hostile`.
+
 `python -m tests.studio.fuzz --count 300 --seed 0`
 """
 
@@ -15,6 +17,7 @@ from pathlib import Path
 from nicegui import ElementFilter, ui
 
 from cdpr_drake.errors import CdprError
+from tests.studio.hostile import attacked
 from tests.studio.pages import opened_page, problems, until
 
 WORDS = [
@@ -128,6 +131,7 @@ def main() -> None:
     os.environ["PYTEST_CURRENT_TEST"] = "fuzz"  # by which NiceGUI knows that nothing is served
     with tempfile.TemporaryDirectory() as folder:
         print(asyncio.run(_opened_and_tried(asked.count, asked.seed, Path(folder))))
+        print(attacked(Path(folder), asked.count, asked.seed))
 
 
 async def _opened_and_tried(count: int, seed: int, folder: Path) -> dict[str, int]:

@@ -15,8 +15,8 @@ from urllib.parse import urlsplit
 
 import aiohttp
 
+from cdpr_drake.studio.page import SCENE
 from cdpr_drake.studio.panel import PANELS
-from cdpr_drake.studio.scene_relay import SCENE
 from tests.studio.served import served
 
 SOCKET = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"

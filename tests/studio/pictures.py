@@ -1,4 +1,4 @@
-"""Pictures of the studio's panels, to be looked at, and the one of its guide.
+"""Pictures of the studio to be looked at: each tab with results at full length, and each dialog.
 
 `python -m tests.studio.pictures FOLDER`, or with `--guide` the pictures of docs/guides/studio.md.
 """
@@ -7,9 +7,14 @@ from __future__ import annotations
 
 import argparse
 import io
+import json
+import subprocess
+import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -25,7 +30,10 @@ from tests.chromium import LONGEST_WAIT, chromium, wait_for
 from tests.studio.run_page import press
 from tests.studio.served import served
 
-SIZES = {"1280": (1280, 800, 1.0), "1920": (1920, 1080, 1.0), "phone": (390, 844, 2.0)}
+SIZES = {"1280": (1280, 800, 1.0), "phone": (390, 844, 1.0)}
+DIALOGS = ("Open", "Save as", "Export", "As text", "Add cable")
+"""Buttons of the tab Robot that open one."""
+
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
 GUIDE = {
     ("robot", False): "studio.webp", ("robot", True): "studio_dark.webp",
@@ -48,19 +56,42 @@ COLOURED = 800
 """So many pixels have a colour in a scene with a robot; an empty one is grey but for its axes."""
 
 
-def look(page: object, size: str, dark: bool) -> None:
+CHOOSE = """
+const of = (e) => e.querySelector('.q-field__label')?.innerText;
+const field = [...document.querySelectorAll('.q-tab-panel .q-select')].find(
+    e => ['results', 'run'].includes(of(e)) && !e.querySelector('.q-field__native').innerText &&
+        !e.querySelector('input')?.value);
+if (!field) return;
+field.querySelector('.q-field__append').click();
+setTimeout(() => document.querySelector('.q-menu .q-item')?.click(), 800);
+"""
+"""Shows a result in a tab that shows none."""
+
+LONG = "return Math.max(document.querySelector('.q-tab-panel').scrollHeight + 60, \
+innerWidth < 500 ? document.documentElement.scrollHeight : 0)"
+"""Height of a tab with all that is in it [px]."""
+
+
+def look(page: Any, size: str, dark: bool, height: int = 0) -> None:
     """Gives the page a size and a liking for dark or light."""
-    width, height, scale = SIZES[size]
-    page.execute_cdp_cmd(  # type: ignore[attr-defined]
+    width, least, scale = SIZES[size]
+    page.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",
-        {"width": width, "height": height, "deviceScaleFactor": scale, "mobile": size == "phone"},
-    )
+        {"width": width, "height": max(height, least), "deviceScaleFactor": scale,
+         "mobile": size == "phone"},
+    )  # fmt: skip
     liking = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
-    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": liking})  # type: ignore[attr-defined]
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": liking})
 
 
 def fill(folder: Path) -> None:
-    """A run, and its log beside the model of its robot."""
+    """A run, its log beside the model of its robot, a workspace and a study."""
+    words = ["workspace", "acrobot_small", "--grid=9,9,9", f"--out={folder / 'workspaces/small'}"]
+    subprocess.run([sys.executable, "-m", "cdpr_drake", *words], check=True)
+    study = folder / "studies" / "tension-methods"
+    study.mkdir(parents=True)
+    said = {"words": "methods agree", "printed": "1", "found": "1", "verdict": "confirmed"}
+    (study / "results.json").write_text(json.dumps({"study": "x", "statements": [said]}))
     run = folder / "runs" / "acrobot_pbvs"
     scenario = load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"])
     simulate(scenario, folder=run)
@@ -69,15 +100,15 @@ def fill(folder: Path) -> None:
     write_asked(folder / "logs" / f".acrobot_pbvs{ASKED}", (), about)
 
 
-def coloured(page: object) -> int:
+def coloured(page: Any) -> int:
     """How many pixels in the right half of the page have a colour."""
-    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:  # type: ignore[attr-defined]
+    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:
         pixels = np.asarray(image.convert("RGB"), int)
     scene = pixels[100:, pixels.shape[1] * 6 // 10 :]
     return int(np.count_nonzero(np.ptp(scene, axis=2) > 60))
 
 
-def wait_for_scene(page: object) -> None:
+def wait_for_scene(page: Any) -> None:
     """Returns once the robot is drawn; in software that may take long."""
     end = time.monotonic() + LONGEST_WAIT
     while coloured(page) < COLOURED:
@@ -86,16 +117,16 @@ def wait_for_scene(page: object) -> None:
         time.sleep(1.0)
 
 
-def keep(page: object, name: str) -> None:
+def keep(page: Any, name: str) -> None:
     """Writes a picture of the guide."""
-    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:  # type: ignore[attr-defined]
+    with Image.open(io.BytesIO(page.get_screenshot_as_png())) as image:
         image.convert("RGB").save(IMAGES / name, quality=QUALITY, method=6)
 
 
-def move_a_point(page: object) -> None:
+def move_a_point(page: Any) -> None:
     """Gives an exit point another place, and waits for the workspace that follows."""
     press(page, "Robot")
-    field = page.find_element("css selector", f'input[aria-label="{MOVED}"]')  # type: ignore[attr-defined]
+    field = page.find_element("css selector", f'input[aria-label="{MOVED}"]')
     field.send_keys(Keys.CONTROL, "a")
     field.send_keys("-0.3", Keys.ENTER)
     wait_for(page, "document.querySelector('.studio-live').innerText.includes('refined')")
@@ -105,44 +136,64 @@ def move_a_point(page: object) -> None:
 def main() -> None:
     """Writes them."""
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("folder", type=Path, nargs="?")
+    options.add_argument("folder", type=Path, nargs="?", default=IMAGES)
     options.add_argument("--guide", action="store_true")
     asked = options.parse_args()
-    sizes = ("1280",) if asked.guide else tuple(SIZES)
-    looks = [(size, dark) for dark in (False, True) for size in sizes]
+    asked.folder.mkdir(parents=True, exist_ok=True)
+    looks = [(size, dark) for size in SIZES for dark in (False, True)]
     with tempfile.TemporaryDirectory() as folder:
         fill(Path(folder))
-        photograph(Path(folder), looks, asked)
-
-
-def photograph(folder: Path, looks: list[tuple[str, bool]], asked: argparse.Namespace) -> None:
-    """Takes pictures of all panels of a studio that works in a folder."""
-    with served(folder, "acrobot_small") as (address, _):
-        for size, dark in looks:
-            with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
-                look(page, size, dark)
-                page.get(address)
-                wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
-                if size != "phone":  # there the scene is below the panel
-                    wait_for_scene(page)
-                count = page.execute_script("return document.querySelectorAll('.q-tab').length")
-                for number in range(count):
-                    tab = page.find_elements("css selector", ".q-tab")[number]
-                    name = tab.text.split("\n")[-1].lower()
-                    tab.click()
-                    time.sleep(SETTLED)
-                    if asked.guide and (name, dark) in GUIDE:
-                        keep(page, GUIDE[name, dark])
-                    elif not asked.guide:
-                        asked.folder.mkdir(parents=True, exist_ok=True)
-                        kind = "dark" if dark else "light"
-                        page.save_screenshot(str(asked.folder / f"{name}_{size}_{kind}.png"))
-                if not dark and size == "1280":
-                    move_a_point(page)
+        with served(folder, "acrobot_small") as (address, _):
+            for size, dark in looks[: 2 if asked.guide else None]:
+                with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
+                    look(page, size, dark)
+                    page.get(address)
+                    wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
                     if asked.guide:
-                        keep(page, DRAGGED)
+                        photograph_guide(page, dark)
                     else:
-                        page.save_screenshot(str(asked.folder / "moved_1280_light.png"))
+                        photograph(page, size, dark, asked.folder)
+
+
+def tabs(page: Any) -> Iterator[str]:
+    """Turns to each tab, and waits until it is there."""
+    for title in page.execute_script(
+        "return [...document.querySelectorAll('.q-tab__label')].map(e => e.textContent)"
+    ):
+        press(page, title)
+        time.sleep(SETTLED)
+        yield title.lower()
+
+
+def photograph(page: Any, size: str, dark: bool, folder: Path) -> None:
+    """Takes pictures of all tabs and dialogs."""
+    kind = f"{size}_{'dark' if dark else 'light'}.png"
+    for name in tabs(page):
+        page.execute_script(CHOOSE)
+        time.sleep(SETTLED)
+        look(page, size, dark, page.execute_script(LONG))
+        time.sleep(1.0)
+        page.save_screenshot(str(folder / f"{name}_{kind}"))
+        look(page, size, dark)
+    press(page, "Robot")
+    for words in DIALOGS:
+        press(page, words)
+        wait_for(page, "document.querySelector('.q-dialog') !== null")
+        time.sleep(1.0)
+        page.save_screenshot(str(folder / f"dialog_{words.lower().replace(' ', '_')}_{kind}"))
+        page.find_element("css selector", "body").send_keys(Keys.ESCAPE)
+        wait_for(page, "document.querySelector('.q-dialog') === null")
+
+
+def photograph_guide(page: Any, dark: bool) -> None:
+    """Takes the pictures of the guide."""
+    wait_for_scene(page)
+    for name in tabs(page):
+        if (name, dark) in GUIDE:
+            keep(page, GUIDE[name, dark])
+    if not dark:
+        move_a_point(page)
+        keep(page, DRAGGED)
 
 
 if __name__ == "__main__":

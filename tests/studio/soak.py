@@ -3,7 +3,7 @@
 `nice python -m tests.studio.soak --minutes 60 --csv soak.csv`
 
 The server writes a row every ten seconds: its memory, and how much there is of what may leak. Said
-at the end is what the second half of the time added; `--trace` also says which lines allocated it.
+at the end is what the second half of the time added.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ import sys
 import tempfile
 import threading
 import time
-import tracemalloc
 from collections import Counter
 from collections.abc import Callable
 from itertools import cycle
@@ -98,29 +97,15 @@ def watched() -> None:
 
 
 async def _write_rows() -> None:
-    start, before = time.monotonic(), None
-    half = float(os.environ["SOAK_HALF"])
+    start, writer = time.monotonic(), None
     with open(os.environ["SOAK_CSV"], "w", newline="") as file:
-        writer = None
         while True:
             row = {"time_s": round(time.monotonic() - start, 1)} | held()
-            if writer is None:
-                writer = csv.DictWriter(file, list(row))
+            writer = writer or csv.DictWriter(file, list(row))
+            if file.tell() == 0:
                 writer.writeheader()
             writer.writerow(row)
             file.flush()
-            if "SOAK_TRACE" in os.environ and row["time_s"] > half / 2.0:
-                if not tracemalloc.is_tracing():
-                    tracemalloc.start(8)
-                elif before is None and row["time_s"] > half:
-                    before = tracemalloc.take_snapshot()
-                elif before is not None and row["time_s"] > 2.0 * half - 2.0 * EVERY:
-                    gc.collect()
-                    grown = tracemalloc.take_snapshot().compare_to(before, "traceback")
-                    lines = ["\n".join([str(x), *x.traceback.format()]) for x in grown[:40]]
-                    Path(os.environ["SOAK_TRACE"]).write_text("\n\n".join(lines))
-                    tracemalloc.stop()
-                    before, half = None, float("inf")
             await asyncio.sleep(EVERY)
 
 
@@ -166,7 +151,7 @@ def request_all(address: str, seconds: float, found: Counter[str]) -> None:
             answer = connection.getresponse()
             body = answer.read().decode(errors="replace")
             found[f"HTTP {answer.status}"] += 1
-            cookie = (answer.headers["Set-Cookie"] or cookie).partition(";")[0]
+            cookie = cookie or (answer.headers["Set-Cookie"] or "").partition(";")[0]
             if path == "/" and answer.status == 200 and len(paths) < 12:
                 paths += [x.partition('"')[0] for x in body.split('="')[1:] if x[0] == "/"]
         except OSError as problem:
@@ -246,13 +231,10 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--minutes", type=float, default=60.0)
     options.add_argument("--csv", type=Path, default=Path("soak.csv"))
-    options.add_argument("--trace", type=Path)
     options.add_argument("--seed", type=int, default=0)
     asked = options.parse_args()
     seconds, found = 60.0 * asked.minutes, Counter[str]()
-    os.environ |= {"SOAK_CSV": str(asked.csv.resolve()), "SOAK_HALF": str(seconds / 2.0)}
-    if asked.trace:
-        os.environ["SOAK_TRACE"] = str(asked.trace.resolve())
+    os.environ["SOAK_CSV"] = str(asked.csv.resolve())
     inside = ("-c", "from tests.studio.soak import watched; watched()")
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as profile:
         short = write_scenario(Path(folder), **{"duration: 30.0": "duration: 0.5"})

@@ -2,13 +2,16 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 from urllib.request import HTTPCookieProcessor, build_opener
 
 from nicegui import ElementFilter
+from nicegui.elements.keyboard import Keyboard
 
 from cdpr_drake.studio.jobs import Job
 from cdpr_drake.studio.panel import PANELS, Panel
-from tests.studio.pages import opened_page, shown, until
+from cdpr_drake.studio.workbench.yaml_edit import with_value
+from tests.studio.pages import open_panel, opened_page, shown, until
 
 LATER = (
     "matplotlib", "cv2", "scipy.optimize", "scipy.spatial", "pydrake.systems.analysis",
@@ -77,3 +80,18 @@ async def test_a_sign_says_that_a_job_works(tmp_path):
         await until(lambda: shown(user, "job-at-work"))
         await bench.jobs.close()
         await until(lambda: not shown(user, "job-at-work"))
+
+
+async def test_keys_undo_and_redo_in_every_tab(tmp_path):
+    async with opened_page(tmp_path) as (user, bench, _):
+        mass = bench.robot.value.platform.mass
+        bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 2.0 * mass))
+        open_panel(user, "pose")
+        for key, shift, factor in ("z", 0, 1.0), ("y", 0, 2.0), ("z", 0, 1.0), ("Z", 1, 2.0):
+            pressed = {"action": "keydown", "key": key, "code": "KeyX", "location": 0,
+                       "repeat": False, "altKey": False, "ctrlKey": True, "metaKey": False,
+                       "shiftKey": bool(shift)}  # fmt: skip
+            with user:
+                (keyboard,) = ElementFilter(kind=Keyboard)
+            keyboard._handle_key(SimpleNamespace(sender=keyboard, client=user.client, args=pressed))
+            assert bench.robot.value.platform.mass == factor * mass, (key, shift)
