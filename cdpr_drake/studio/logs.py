@@ -23,13 +23,13 @@ from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.boards import CommandBoard
+from cdpr_drake.studio.folder import MOST_FILES, WorkingFolder
 from cdpr_drake.studio.panel import LOG, robot_argument, show_errors
 from cdpr_drake.studio.panels.command_fields import Choices, CommandFields, Filled
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import CommandResults, View, place_image, show_results
-from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 
 RESULTS = "logs"
 """Folder of comparisons in the working folder."""

@@ -16,13 +16,12 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.studio.jobs import JobState
 from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
-from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run_board import RunBoard, RunEntry
+from cdpr_drake.studio.scenario import ScenarioForm
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch, SceneOfRuns, SteeringBar
-from cdpr_drake.studio.workbench.scenario_draft import ROBOT
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -163,7 +162,7 @@ class RunPanel:
         self._refused, is_own = None, own_subject is not None and not own_subject.is_another(now)
         words = f"Runs {now.robot}, the robot that is open"
         try:
-            draft.change(ROBOT, own if is_own else robot_argument(self._bench))
+            draft.robot = own if is_own else robot_argument(self._bench)
             words += "." if is_own else f", instead of the scenario's {own}."
         except CdprError as problem:
             self._refused, words = problem, f"Nothing can be started: {problem}."

@@ -11,7 +11,7 @@ from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.finished_run import FinishedRun, is_run
 from cdpr_drake.studio.jobs import Job, JobManager
 from cdpr_drake.studio.run_job import RunJob
-from cdpr_drake.studio.workbench.scenario_draft import ScenarioDraft
+from cdpr_drake.studio.scenario import ScenarioDraft
 
 RUNS = "runs"
 """Folder of results in the working folder, as that of `cdpr simulate`."""

@@ -24,13 +24,13 @@ from cdpr_drake.studio.door import (
     TOKEN_WORDS,
     Door,
 )
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import add_scene_relay
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.sessions import Sessions
 from cdpr_drake.studio.workbench.command_form import CommandForm
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 LONGEST_ABSENCE = 30.0
 """Time for which a page that says nothing is kept, as where a machine is busy [s]."""

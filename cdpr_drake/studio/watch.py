@@ -25,8 +25,8 @@ from cdpr_drake.studio.run_board import RunBoard, RunEntry, outcome_words
 from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.scene import RobotScene, RunScene
 from cdpr_drake.studio.session import Workbench
+from cdpr_drake.studio.side_by_side import Pair
 from cdpr_drake.studio.views import leaves, show_results
-from cdpr_drake.studio.workbench.side_by_side import Pair
 
 Sample = Mapping[str, Any]
 

@@ -11,6 +11,7 @@ from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.command_forms import LEFT_OUT, command_forms
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.regions import (
     PLANE,
     UNKNOWN,
@@ -21,7 +22,6 @@ from cdpr_drake.studio.regions import (
     show_regions,
 )
 from cdpr_drake.studio.workbench.command_form import FieldProblem, OptionKind
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 
 @pytest.fixture(scope="module")

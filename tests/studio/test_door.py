@@ -14,12 +14,12 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.door import IS_TOKEN, SESSION, Door
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.scene_relay import SCENE
 from cdpr_drake.studio.server import put_before_all, serve
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.sessions import MOST_SESSIONS, Sessions
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.messages import printed
 from tests.studio.served import served
 

@@ -9,7 +9,7 @@ import pytest
 from cdpr_drake.formats.robot_exports import export_omissions, omission_words
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.page import PREFERS_DARK
-from cdpr_drake.studio.workbench.yaml_edit import with_value
+from cdpr_drake.studio.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
 from tests.studio.fuzz import fuzz
 from tests.studio.pages import field, problems, shown, type_into, until

@@ -7,11 +7,11 @@ import sys
 import zipfile
 from contextlib import asynccontextmanager
 
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.run import run_panel
 from cdpr_drake.studio.run_job import RunJob
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, shown, simulated, until
 
 

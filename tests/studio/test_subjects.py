@@ -9,8 +9,8 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run import _boards, _scenes
-from cdpr_drake.studio.workbench.yaml_edit import with_value
 from cdpr_drake.studio.workspace import _views
+from cdpr_drake.studio.yaml_edit import with_value
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT, OTHER = "acrobot_small", "planar"

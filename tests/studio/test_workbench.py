@@ -8,11 +8,11 @@ import pytest
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.pose_answer import RobotQuestions, axis_values, pose_at, pose_axes
 from cdpr_drake.studio.scene import EXITS
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.yaml_edit import with_value
+from cdpr_drake.studio.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
 
 ROUNDING = 1e-9

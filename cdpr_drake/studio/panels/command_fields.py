@@ -8,13 +8,13 @@ from typing import Any
 
 from nicegui import ui
 
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.workbench.command_form import (
     CommandForm,
     CommandOption,
     FieldProblem,
     OptionKind,
 )
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ or where the robot itself is.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
-from typing import Any
 from xml.etree import ElementTree
 
 from cdpr_drake.errors import CdprError, RobotFileError
@@ -20,11 +20,9 @@ from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.schema.yaml_files import load_yaml
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-
-LARGEST_TEXT = 262_144
-"""Of a robot file [bytes], as its loader has it."""
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml, too_many_bytes
+from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.yaml_edit import value_in
 
 LARGEST_UPLOAD = 4_194_304
 """Of a file of another tool [bytes], as its readers have it."""
@@ -42,12 +40,19 @@ NAMED_FILES = ("file", "filename", "meshdir", "texturedir", "assetdir", "url")
 """Attributes of XML files that name other files."""
 
 
+@dataclass(frozen=True)
 class OpenedRobot:
-    """A robot that was read: its text, where messages say that it stands, and what to know."""
+    """A robot that was read.
 
-    def __init__(self, text: str, path: Path, notes: list[str]) -> None:
-        """With the text of a robot file."""
-        self.text, self.path, self.notes = text, path, notes
+    Attributes:
+        text: That of a robot file.
+        path: Where messages say that it stands.
+        notes: What to know of a file of another tool, a sentence each.
+    """
+
+    text: str
+    path: Path
+    notes: list[str]
 
 
 class RobotFiles:
@@ -67,32 +72,20 @@ class RobotFiles:
             RobotFileError: The text is too long, does not describe a possible robot, or names a
                 file that lies elsewhere.
         """
-        size = len(text.encode("utf-8", "replace"))
-        if size > LARGEST_TEXT:
-            raise RobotFileError(
-                f"{path}: found {size:,} bytes; accepted: at most {LARGEST_TEXT:,}"
-            )
-        self._check_mesh(text, path)
-        return parse_robot(text, path)
-
-    def _check_mesh(self, text: str, path: Path) -> None:
         try:
-            found: Any = load_yaml(text)
-        except ValueError:
-            return  # the reader of robots says what is wrong
-        for key in ("platform", "shape", "file"):
-            found = found.get(key) if isinstance(found, dict) else None
-        if not isinstance(found, str):
-            return
+            mesh = value_in(load_yaml(text), ("platform", "shape", "file"))
+        except YamlTextError:
+            mesh = None  # the reader of robots says what is wrong
         try:
-            mesh = (path.parent / found).resolve()
+            where = (path.parent / mesh).resolve() if isinstance(mesh, str) else self._roots[0]
         except (OSError, ValueError, RuntimeError):
-            mesh = Path("/")
-        if not any(mesh.is_relative_to(root) for root in self._roots):
+            where = Path("/")
+        if not any(where.is_relative_to(root) for root in self._roots):
             raise RobotFileError(
-                f"{path}: platform.shape.file: found {found[:80]!r}, outside of the working "
+                f"{path}: platform.shape.file: found {mesh[:80]!r}, outside of the working "
                 "folder; accepted: a file in it"
             )
+        return parse_robot(text, path)
 
     def open(self, name: str) -> OpenedRobot:
         """A robot of the package by name, or the file of the working folder of that name.
@@ -105,7 +98,7 @@ class RobotFiles:
         path = self._folder.path(name)
         if not path.is_file():
             raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
-        return self._read_file(path)
+        return self._read_file(path, path.parent)
 
     def robot(self, name: str) -> Robot:
         """The robot that `open` would open.
@@ -116,7 +109,9 @@ class RobotFiles:
         opened = self.open(name)
         return self.read(opened.text, opened.path)
 
-    def _read_file(self, path: Path) -> OpenedRobot:
+    def _read_file(self, path: Path, folder: Path) -> OpenedRobot:
+        """The robot of a file, which stands in a folder from now on."""
+        notes: list[str] = []
         if path.suffix.lower() not in UPLOADS:
             raise RobotFileError(
                 f"{path.name[:100]}: found the ending {path.suffix[:20]!r}; accepted: "
@@ -125,23 +120,21 @@ class RobotFiles:
         if is_foreign(path):
             _check_names(path)
             imported = import_robot(path)
-            completed = imported.completed
+            completed, text = imported.completed, imported.yaml()
             notes = [f"read as {imported.tool}"]
             notes += [f"assumed {key}: {words}" for key, words in completed.assumed.items()]
-            notes += list(completed.remarks)
-            self.read(imported.yaml(), path)
-            return OpenedRobot(imported.yaml(), path.with_suffix(".yaml"), notes)
-        if path.stat().st_size > LARGEST_TEXT:
-            raise RobotFileError(
-                f"{path.name}: found {path.stat().st_size:,} bytes; accepted: at most "
-                f"{LARGEST_TEXT:,}"
-            )
-        try:
-            text = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError as problem:
-            raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
-        self.read(text, path)
-        return OpenedRobot(text, path, [])
+            notes += [words.replace(f"{path.parent}/", "") for words in completed.remarks]
+            path = path.with_suffix(".yaml")
+        else:
+            large = too_many_bytes(path)
+            if large:
+                raise RobotFileError(f"{path.name}: {large}")
+            try:
+                text = path.read_text(encoding="utf-8")
+            except UnicodeDecodeError as problem:
+                raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
+        self.read(text, folder / path.name)
+        return OpenedRobot(text, folder / path.name, notes)
 
     def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
         """A robot from files that came over the network, by their names; one, or those of a model.
@@ -152,32 +145,28 @@ class RobotFiles:
         if not 0 < len(files) <= MOST_UPLOADS:
             raise RobotFileError(f"found {len(files)} files; accepted: 1 to {MOST_UPLOADS}")
         with TemporaryDirectory(prefix="cdpr-studio-") as scratch:
-            paths = [self._keep(Path(scratch), *item) for item in files.items()]
+            paths = [_put(Path(scratch), *item) for item in files.items()]
             problems: list[str] = []
             for path in paths:
                 try:
-                    opened = self._read_file(path)
+                    return self._read_file(path, self._folder.root)
                 except CdprError as problem:
                     problems += str(problem).replace(f"{scratch}/", "").split("\n")
-                    continue
-                # From now on it stands in the working folder, once it is saved.
-                opened.path = self._folder.root / opened.path.name
-                self.read(opened.text, opened.path)
-                opened.notes = [words.replace(f"{scratch}/", "") for words in opened.notes]
-                return opened
         raise RobotFileError(*problems)
 
-    def _keep(self, scratch: Path, name: str, content: bytes) -> Path:
-        plain = PurePath(name.replace("\\", "/")).name
-        if not plain or plain.startswith(".") or not plain.isprintable() or len(plain) > 100:
-            raise RobotFileError(f"name: found {name[:80]!r}; accepted: the name of a file")
-        if len(content) > LARGEST_UPLOAD:
-            raise RobotFileError(
-                f"{plain}: found {len(content):,} bytes; accepted: at most {LARGEST_UPLOAD:,}"
-            )
-        path = scratch / plain
-        path.write_bytes(content)
-        return path
+
+def _put(folder: Path, name: str, content: bytes) -> Path:
+    """Writes a file that came over the network."""
+    plain = PurePath(name.replace("\\", "/")).name
+    if not plain or plain.startswith(".") or not plain.isprintable() or len(plain) > 100:
+        raise RobotFileError(f"name: found {name[:80]!r}; accepted: the name of a file")
+    if len(content) > LARGEST_UPLOAD:
+        raise RobotFileError(
+            f"{plain}: found {len(content):,} bytes; accepted: at most {LARGEST_UPLOAD:,}"
+        )
+    path = folder / plain
+    path.write_bytes(content)
+    return path
 
 
 def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list[str]]:
@@ -202,11 +191,7 @@ def export_formats() -> dict[str, str]:
 
 
 def _check_names(path: Path) -> None:
-    """Refuses XML that names files elsewhere, before anybody follows them.
-
-    Raises:
-        RobotFileError: It does.
-    """
+    """Refuses XML that names files elsewhere, before anybody follows them."""
     if path.suffix.lower() in (".yaml", ".yml", ".json") or path.stat().st_size > LARGEST_UPLOAD:
         return  # which name none, or are refused for their size
     try:
@@ -214,13 +199,13 @@ def _check_names(path: Path) -> None:
     except (ElementTree.ParseError, ValueError, LookupError):
         return  # the reader says what is wrong
     for element in root.iter():
-        named = [element.get(key, "") for key in NAMED_FILES]
-        if str(element.tag).rpartition("}")[2] in ("uri", "include"):
-            named.append((element.text or "").strip())
-        for words in named:
+        tag, names = str(element.tag), [element.get(key, "") for key in NAMED_FILES]
+        if tag.rpartition("}")[2] in ("uri", "include"):
+            names.append((element.text or "").strip())
+        for words in names:
             where = words.partition("://")[2] if "://" in words else words
             if where.startswith(("/", "\\", "~")) or ".." in PurePath(where).parts:
                 raise RobotFileError(
-                    f"{path.name}: <{str(element.tag)[:40]}>: found {words[:80]!r}, a file "
-                    "elsewhere; accepted: names of files beside it"
+                    f"{path.name}: <{tag[:40]}>: found {words[:80]!r}, a file elsewhere; accepted: "
+                    "names of files beside it"
                 )
