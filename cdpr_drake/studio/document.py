@@ -66,11 +66,12 @@ class Document(Generic[T]):
             while True:
                 before, path = self.text, self.path
                 text = edit(before)
+                if text == before:
+                    return
                 value = await asyncio.to_thread(self._read, text, path)
                 if (self.text, self.path) == (before, path):  # else it was changed meanwhile
                     break
-            if text != before:
-                self._take(text, value, path)
+            self._take(text, value, path)
 
     async def settled(self) -> None:
         """Waits for edits that are being read."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import zipfile
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 from functools import partial
 from html import escape
@@ -71,14 +72,19 @@ def robot_panel(bench: Workbench) -> None:
     on_page(bench.robot.changed, refresh)
 
 
-async def _act(bench: Workbench, action: Callable[[Workbench], None]) -> None:
+async def _act(bench: Workbench, action: Callable[[Workbench], Awaitable[None]]) -> None:
     """Does something with the robot once what was typed last is in it."""
     with show_errors():
         await bench.robot.settled()
-        action(bench)
+        await action(bench)
 
 
-def open_dialog(bench: Workbench) -> None:
+def _names(bench: Workbench, suffixes: tuple[str, ...]) -> tuple[list[str], list[str]]:
+    """Robots of the package, and files of the folder; read in another thread."""
+    return list(robot_names()), bench.folder.files(suffixes)
+
+
+async def open_dialog(bench: Workbench) -> None:
     """Chooses a robot of the package, a file of the folder, or files of this computer."""
 
     async def take(read: Callable[[], OpenedRobot], take: Callable[[OpenedRobot], Any]) -> None:
@@ -99,10 +105,11 @@ def open_dialog(bench: Workbench) -> None:
         if not await attempt(partial(take, read, bench.take_upload)):
             upload.reset()
 
+    robots, files = await asyncio.to_thread(_names, bench, UPLOADS)
     with dialog("Open a robot") as attempt:
         for mark, label, names in (
-            ("open-robot", "Robot of the package", list(robot_names())),
-            ("open-file", f"File in {bench.folder.root}", bench.folder.files(UPLOADS)),
+            ("open-robot", "Robot of the package", robots),
+            ("open-file", f"File in {bench.folder.root}", files),
         ):
             chosen = ui.select(names, label=label, with_input=True, on_change=choose)
             chosen.props("dense outlined").classes("w-full").mark(mark)
@@ -119,11 +126,11 @@ def open_dialog(bench: Workbench) -> None:
         ui.label("Read: " + ", ".join(UPLOADS)).classes("studio-soft")
 
 
-def _save(bench: Workbench) -> None:
+async def _save(bench: Workbench) -> None:
     if bench.file:
         save_to(bench, bench.file, overwrite=True)
     else:
-        save_dialog(bench)
+        await save_dialog(bench)
 
 
 def save_to(bench: Workbench, name: str, overwrite: bool) -> None:
@@ -132,7 +139,7 @@ def save_to(bench: Workbench, name: str, overwrite: bool) -> None:
     notify(f"saved as {name}", "positive")
 
 
-def save_dialog(bench: Workbench) -> None:
+async def save_dialog(bench: Workbench) -> None:
     """Asks for a name in the folder."""
 
     async def save() -> None:
@@ -145,7 +152,7 @@ def save_dialog(bench: Workbench) -> None:
         replace = ui.checkbox("Replace a file of this name").mark("save-replace")
 
 
-def export_dialog(bench: Workbench) -> None:
+async def export_dialog(bench: Workbench) -> None:
     """Hands out the robot in a format, one file or a zip archive of several."""
 
     async def download() -> None:
@@ -179,9 +186,9 @@ def place_beside(bench: Workbench) -> None:
         other.props("dense outlined").classes("w-full")
         table = ui.html("", sanitize=False).classes("w-full").mark("robot-pairs")
 
-    def unfold() -> None:
-        names = [NOTHING, *robot_names(), *bench.folder.files((".yaml", ".yml"))]
-        other.set_options(names, value=other.value)
+    async def unfold() -> None:
+        robots, files = await asyncio.to_thread(_names, bench, (".yaml", ".yml"))
+        other.set_options([NOTHING, *robots, *files], value=other.value)
 
     def compare() -> None:
         name, one = str(other.value), bench.robot.value

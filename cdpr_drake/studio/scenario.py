@@ -14,11 +14,11 @@ from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.schema.input_files import input_text
-from cdpr_drake.schema.typed_yaml import plain_values
+from cdpr_drake.schema.typed_yaml import plain_value, plain_values
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.panel import message
-from cdpr_drake.studio.settings_form import SettingsForm, document_buttons, plain
+from cdpr_drake.studio.settings_form import SettingsForm, document_buttons
 from cdpr_drake.studio.yaml_edit import flow
 from cdpr_drake.systems.diagrams.load import load_scenario, parse_scenario
 from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_file
@@ -128,8 +128,8 @@ def differences(before: Any, now: Any, above: str = "") -> Iterator[str]:
         old, new, key = getattr(before, name), getattr(now, name), f"{above}{name}"
         if rule.kind == "section" and old is not None and new is not None:
             yield from differences(old, new, f"{key}.")
-        elif plain(old) != plain(new):
-            yield f"{key}={flow(plain(new))}"
+        elif plain_value(old) != plain_value(new):
+            yield f"{key}={flow(plain_value(new))}"
 
 
 def texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:

@@ -6,8 +6,8 @@ What is typed becomes what a file would have; the checks of files judge it, in t
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, is_dataclass, replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from typing import Any
 
@@ -17,7 +17,7 @@ from nicegui import ui
 from cdpr_drake.errors import CdprError, DataFileError
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.declarations import Setting, settings_of
-from cdpr_drake.schema.typed_yaml import plain_values
+from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.panel import message, notify, on_page, show_errors
@@ -32,30 +32,21 @@ SHORT = 3
 LONGEST_LIST = 40
 """Choices that are offered as a list; more are typed."""
 
-STEPS = ("keydown.ctrl.z", "keydown.meta.z", "keydown.ctrl.y", "keydown.meta.y")
-
-
-def plain(value: Any) -> Any:
-    """A value of settings as a file has it."""
-    if isinstance(value, list):
-        return [plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return plain_values(value) if is_dataclass(value) else value
+NUMBERS = ("number", "whole")
 
 
 def field_words(rule: Setting, value: Any) -> Any:
     """A value of settings as it stands in a field: words, or True and False of a switch."""
     if rule.kind == "switch":
         return bool(value)
+    if rule.kind in NUMBERS and value is not None:
+        is_short = value == int(value) and abs(value) < 1e7
+        return str(int(value)) if is_short else repr(float(value))
+    if rule.kind == "array" and np.ndim(value) == 1:
+        return ", ".join(field_words(replace(rule, type=float), number) for number in value)
     if value is None or isinstance(value, str):
         return value or ""
-    if rule.kind in ("number", "whole"):
-        whole = value == int(value) and abs(value) < 1e7
-        return str(int(value)) if whole else repr(float(value))
-    if rule.kind == "array" and value.ndim == 1:
-        return ", ".join(field_words(replace(rule, type=float), number) for number in value)
-    return ", ".join(value) if rule.kind == "texts" else flow(plain(value))
+    return ", ".join(value) if rule.kind == "texts" else flow(plain_value(value))
 
 
 def typed_value(rule: Setting, typed: Any) -> Any:
@@ -71,28 +62,23 @@ def typed_value(rule: Setting, typed: Any) -> Any:
     words = str(typed or "").strip()
     if not words and rule.nullable:
         return None
-    if rule.kind in ("number", "whole"):
-        for kind in (int, float):
-            try:
-                number = kind(words)
-            except ValueError:
-                continue
-            return number if np.isfinite(number) else words
-    if rule.kind in ("text", "number", "whole"):
+    if rule.kind in NUMBERS:
+        return _typed_number(words)
+    if rule.kind == "text":
         return words
     if words.startswith(("[", "{")) or rule.section:
         return load_yaml(words)
     if rule.kind == "texts":
         return [word.strip() for word in words.split(",") if word.strip()]
-    number_rule = replace(rule, type=float, nullable=False)
-    return [typed_value(number_rule, word) for word in words.replace(",", " ").split()]
+    return [_typed_number(word) for word in words.replace(",", " ").split()]
 
 
-def value_at(settings: Any, place: Place) -> Any:
-    """What stands at a place in settings; None where a section on the way is not there."""
-    for key in place:
-        settings = settings[key] if isinstance(key, int) else getattr(settings, key, None)
-    return settings
+def _typed_number(words: str) -> float | int | str:
+    for kind in (int, float):
+        with suppress(ValueError):
+            number = kind(words)
+            return number if np.isfinite(number) else words
+    return words
 
 
 @dataclass(frozen=True)
@@ -103,15 +89,6 @@ class _Cell:
     rule: Setting
     element: Any
     problem: Any
-
-
-@dataclass(frozen=True)
-class _Pending:
-    """What was typed at a place and is not accepted."""
-
-    edit: Edit
-    typed: Any
-    words: str
 
 
 class SettingsForm:
@@ -143,7 +120,7 @@ class SettingsForm:
         self._common, self._without, self._first = common, without, first
         self._unfolded, self._colored, self._lazy = set(opened), colored, lazy
         self._cells: list[_Cell] = []
-        self._pending: dict[Place, _Pending] = {}
+        self._pending: dict[Place, tuple[Any, str, Any]] = {}  # typed, why not, in whose place
         self._layout, self._path = None, document.path
         self._box = ui.element("div").classes("w-full")
         self.refresh()
@@ -161,6 +138,7 @@ class SettingsForm:
             self._box.clear()
             with self._box:
                 self._build()
+            return
         self._cells = [cell for cell in self._cells if not cell.element.is_deleted]
         for cell in self._cells:
             self._show(cell)
@@ -168,7 +146,7 @@ class SettingsForm:
     def _build(self) -> None:
         with ui.element("div").classes("studio-form"):
             for place in self._common:
-                if hasattr(value_at(self._document.value, place[:-1]), str(place[-1])):
+                if hasattr(value_in(self._document.value, place[:-1]), str(place[-1])):
                     self._row(place, " ".join(map(str, place)))
         rules = settings_of(self._schema)
         for name in dict.fromkeys([*self._first, *rules]):
@@ -191,29 +169,28 @@ class SettingsForm:
 
     def _rules(self, place: Place) -> dict[str, Setting]:
         """The settings of the section or item at a place, or of the items of a list there."""
-        schema = self._schema
-        for key in place:
-            if isinstance(key, str):
-                schema = settings_of(schema)[key].section
-        return settings_of(schema)
+        names = [key for key in place if isinstance(key, str)]
+        return settings_of(
+            reduce(lambda schema, key: settings_of(schema)[key].section, names, self._schema)
+        )
 
     def _inner(self, place: Place) -> None:
         """A section with its own, or a table; of what is not there how to add it."""
         rule = self._rules(place[:-1])[str(place[-1])]
-        value, name = value_at(self._document.value, place), _words(place[-1])
+        value, name = value_in(self._document.value, place), _words(place[-1])
+        put: Callable[[str, Place, Any], str] = with_value
         if rule.kind == "sections":
             self._table(place, len(value))
             name, put = name.removesuffix("s"), with_item
         elif value is None:
             ui.label(rule.doc).classes("studio-soft")
-            put = with_value
         else:
             self._section(place)
             if rule.nullable:
                 edit = partial(with_value, place=place, value=None)
-                _button(f"Remove {name}", "delete", lambda: self._change(edit))
+                _button(f"Remove {name}", "delete", partial(self._change, edit))
             return
-        _button(f"Add {name}", "add", lambda: self._add(place, f"Add {name}", put))
+        _button(f"Add {name}", "add", partial(self._add, place, f"Add {name}", put))
 
     def _section(self, place: Place) -> None:
         """The fields of a section, or of an item of a list, then its own sections."""
@@ -241,24 +218,21 @@ class SettingsForm:
     def _field(self, place: Place, box: Any) -> None:
         """Makes the inputs of one field in a box, one or one for each number, and their labels."""
         rule = self._rules(place[:-1])[str(place[-1])]
-        cells = [(place, rule)]
+        inputs = [(place, rule)]
         if _in_parts(rule):
-            cells = [((*place, k), replace(rule, type=float)) for k in range(SHORT)]
-        for at, part in cells:
+            inputs = [((*place, k), replace(rule, type=float)) for k in range(SHORT)]
+        for at, part in inputs:
             with box:
                 element = self._input(at, part)
             problem = ui.label().classes("studio-field-problem").props('role="alert"')
-            cell = _Cell(at, part, element, problem)
-            self._cells.append(cell)
-            self._show(cell)
-            self._listen(cell)
+            self._cells.append(_Cell(at, part, element, problem))
+            self._show(self._cells[-1])
+            self._listen(self._cells[-1])
 
     def _input(self, place: Place, rule: Setting) -> Any:
-        *above, last = place
-        is_part = isinstance(last, int)
-        words = " ".join(
-            map(_words, [*above, _axes(rule)[last] if isinstance(last, int) else last])
-        )
+        last, is_part = place[-1], isinstance(place[-1], int)
+        name = _axes(rule)[int(last)] if is_part else last
+        words = " ".join(map(_words, (*place[:-1], name)))
         if rule.kind == "switch":
             element: Any = ui.switch()
         elif _is_choice(rule):
@@ -276,51 +250,59 @@ class SettingsForm:
         return element.classes("studio-cell" if is_part else "studio-field")
 
     def _listen(self, cell: _Cell) -> None:
-        commit = partial(self.commit, cell)
+        commit, step = partial(self._commit, cell), partial(self._step, cell)
         if cell.rule.kind == "switch" or _is_choice(cell.rule):
             cell.element.on_value_change(commit)
             return
         cell.element.on("keydown.enter", commit).on("blur", commit)
         cell.element.on("keydown.escape", partial(self._drop, cell))
-        for keys in STEPS:
-            cell.element.on(keys, lambda event: self._step(cell, event.args), ["key", "shiftKey"])
+        for keys in ("ctrl.z", "meta.z", "ctrl.y", "meta.y"):
+            cell.element.on(f"keydown.{keys}", step, ["key", "shiftKey"])
 
     def _drop(self, cell: _Cell) -> None:
         self._pending.pop(cell.place, None)
         self._show(cell)
 
-    def _step(self, cell: _Cell, pressed: Any) -> None:
+    def _step(self, cell: _Cell, event: Any) -> None:
         """Ctrl-Z, Ctrl-Y and Ctrl-Shift-Z in a field, where nothing typed is to be taken back."""
         if cell.element.value == self._shown(cell):
-            again = str(pressed["key"]).lower() == "y" or pressed["shiftKey"]
+            again = str(event.args["key"]).lower() == "y" or event.args["shiftKey"]
             (self._document.redo if again else self._document.undo)()
 
     def _shown(self, cell: _Cell) -> Any:
-        return field_words(cell.rule, value_at(self._document.value, cell.place))
+        return field_words(cell.rule, value_in(self._document.value, cell.place))
 
     def _show(self, cell: _Cell) -> None:
-        pending = self._pending.get(cell.place)
-        cell.element.value = pending.typed if pending else self._shown(cell)
-        cell.element.props(**{"add" if pending else "remove": "error"})
-        cell.problem.text = pending.words if pending else ""
-        cell.problem.set_visibility(bool(pending))
+        shown = self._shown(cell)
+        typed, words, before = self._pending.get(cell.place, (shown, "", shown))
+        if shown != before:  # somebody has changed that
+            del self._pending[cell.place]
+            typed, words = shown, ""
+        cell.element.value = typed
+        cell.element.props(**{"add" if words else "remove": "error"})
+        cell.problem.text = words
+        cell.problem.set_visibility(bool(words))
 
-    async def commit(self, cell: _Cell) -> None:
+    async def _commit(self, cell: _Cell) -> None:
         """Puts what is typed in a field into the document, or says beside it why not."""
         typed = cell.element.value
         self._pending.pop(cell.place, None)
         if typed != self._shown(cell):
-            edit = partial(self._typed, cell.place, cell.rule, typed)
-            words = await self.change(edit)
+            words = await self.change(partial(self._typed, cell.place, typed))
             if words:
-                self._pending[cell.place] = _Pending(edit, typed, words)
+                self._pending[cell.place] = typed, words, self._shown(cell)
         self._show(cell)
 
-    def _typed(self, place: Place, rule: Setting, typed: Any, text: str) -> str:
-        array = place[:-1] if isinstance(place[-1], int) else place
-        order = list(self._rules(array[:-1]))
-        if array != place and value_in(load_yaml(text), array) is None:  # an array by default
-            text = with_value(text, array, plain(value_at(self._document.value, array)), order)
+    def _typed(self, place: Place, typed: Any, text: str) -> str:
+        """The text with what was typed at a place."""
+        field = place[:-1] if isinstance(place[-1], int) else place
+        rules = self._rules(field[:-1])
+        rule, order = rules[str(field[-1])], list(rules)
+        if field != place:
+            rule = replace(rule, type=float)
+            if value_in(load_yaml(text), field) is None:  # it is not in the file
+                array = plain_value(value_in(self._document.value, field))
+                text = with_value(text, field, array, order)
         return with_value(text, place, typed_value(rule, typed), order)
 
     async def change(self, edit: Edit) -> str:
@@ -331,7 +313,7 @@ class SettingsForm:
         """
         pending, words = dict(self._pending), ""
         for others in [pending, {}] if pending else [{}]:
-            edits = [*(other.edit for other in others.values()), edit]
+            edits = [*(partial(self._typed, at, typed) for at, (typed, *_) in others.items()), edit]
             try:
                 await self._document.edit(partial(reduce, lambda text, one: one(text), edits))
             except (CdprError, OSError, ValueError) as problem:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from dataclasses import is_dataclass
 from typing import Any
 
 import yaml
@@ -34,24 +35,20 @@ def with_value(text: str, place: Place, value: Any, order: Sequence[str] = ()) -
     for key in reversed(place[depth:]):
         value = {key: value}
     place = place[:depth]
-    value_in(data, place[:-1])[place[-1]] = value
+    parent = value_in(data, place[:-1])
+    if isinstance(parent, list) and place[-1] == len(parent):
+        parent.append(value)
+    else:
+        parent[place[-1]] = value
     return _checked(_put(text, place, value, order), data)
 
 
 def with_item(text: str, place: Place, value: Any) -> str:
     """The text with one more item at the end of the list at a place, made if it is not there."""
-    data = load_yaml(text)
-    items = value_in(data, place)
-    if not items:
-        return with_value(text, place, [value])
-    items.append(value)
-    node = _node(compose_yaml(text), place)
-    if not isinstance(node, yaml.SequenceNode):
-        return _checked(None, data)
-    if node.flow_style:
-        return _checked(_in_flow(text, node, flow(value)), data)
-    end, column = _line_end(text, _content_end(node)), node.start_mark.column
-    return _checked(f"{text[:end]}\n{' ' * column}- {flow(value)}{text[end:]}", data)
+    items = value_in(load_yaml(text), place)
+    if items:
+        return with_value(text, (*place, len(items)), value)
+    return with_value(text, place, [value])
 
 
 def without_item(text: str, place: Place) -> str:
@@ -68,11 +65,11 @@ def without_item(text: str, place: Place) -> str:
 
 
 def value_in(data: Any, place: Place) -> Any:
-    """What stands at a place of plain values; None: nothing."""
+    """What stands at a place in plain values or settings; None: nothing."""
     for key in place:
         try:
-            data = data[key]
-        except (KeyError, IndexError, TypeError):
+            data = getattr(data, str(key)) if is_dataclass(data) else data[key]
+        except (AttributeError, KeyError, IndexError, TypeError):
             return None
     return data
 
@@ -122,25 +119,22 @@ def _put(text: str, place: Place, value: Any, order: Sequence[str]) -> str | Non
             # What stood on lines of its own now stands behind its key.
             start, words = len(text[:start].rstrip()), f" {words}"
         return f"{text[:start]}{words}{text[end:]}"
-    if not isinstance(parent, yaml.MappingNode):
+    if not isinstance(parent, yaml.CollectionNode):
         return None
-    pair = f"{place[-1]}: {words}"
+    is_list = isinstance(parent, yaml.SequenceNode)
+    if not is_list:
+        words = f"{place[-1]}: {words}"
     if parent.flow_style:
-        return _in_flow(text, parent, pair)
+        end = parent.end_mark.index - 1
+        return f"{text[:end].rstrip()}{', ' if parent.value else ''}{words}{text[end:]}"
+    margin = " " * parent.start_mark.column
     later = order[order.index(str(place[-1])) + 1 :] if place[-1] in order else ()
-    margin = " " * parent.value[0][0].start_mark.column
-    for name, _ in parent.value:
+    for name, _ in () if is_list else parent.value:
         if name.value in later:
             start = name.start_mark.index
-            return f"{text[:start]}{pair}\n{margin}{text[start:]}"
+            return f"{text[:start]}{words}\n{margin}{text[start:]}"
     end = _line_end(text, _content_end(parent))
-    return f"{text[:end]}\n{margin}{pair}{text[end:]}"
-
-
-def _in_flow(text: str, node: yaml.CollectionNode, words: str) -> str:
-    """The text with words at the end of a list or mapping in braces."""
-    end = node.end_mark.index - 1
-    return f"{text[:end].rstrip()}{', ' if node.value else ''}{words}{text[end:]}"
+    return f"{text[:end]}\n{margin}{'- ' if is_list else ''}{words}{text[end:]}"
 
 
 def _node(node: Any, place: Sequence[str | int]) -> yaml.Node | None:

@@ -160,7 +160,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     says = lambda words: words in field(user, "run-robot").text  # noqa: E731
     await until(lambda: says(f"Runs {ROBOT}, the robot that is open."))
     bench.open("acrobot_large")
-    await until(lambda: board.draft.settings() == ('robot="acrobot_large"',))
+    await until(lambda: board.draft.settings() == ("robot=acrobot_large",))
     assert board.draft.check().robot == "acrobot_large"
     await until(lambda: says(f"instead of the scenario's {ROBOT}"))
     bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
