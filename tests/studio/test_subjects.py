@@ -184,6 +184,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
 
 async def test_two_robots_and_two_runs_are_shown_beside_each_other(user, bench):
     field(user, "robot-beside").value = True
+    await until(lambda: "acrobot_large" in field(user, "other-robot").options)
     field(user, "other-robot").value = "acrobot_large"
     await until(lambda: "platform mass [kg]" in field(user, "robot-pairs").content)
     before = field(user, "robot-pairs").content
