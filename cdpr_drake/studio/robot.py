@@ -13,6 +13,8 @@ from typing import Any
 
 from nicegui import events, run, ui
 
+from cdpr_drake.formats.robot_exchange import export_robot
+from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
 from cdpr_drake.studio.numbers import pair_table
@@ -22,11 +24,9 @@ from cdpr_drake.studio.robot_files import (
     MOST_UPLOADS,
     UPLOADS,
     OpenedRobot,
-    export_formats,
-    exported,
 )
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.settings_form import SettingsForm, dialog, document_buttons
+from cdpr_drake.studio.settings_form import SettingsForm, dialog, document_buttons, tool
 from cdpr_drake.studio.side_by_side import Pair, robots_side_by_side
 
 FIRST = ("cables", "platform", "tension_bounds")
@@ -34,6 +34,9 @@ OPENED = ("cables", "tension_bounds")
 
 NO_FILE = "not in a file of the folder yet; Save as puts it there"
 NOTHING = "none"
+
+YAML = "yaml"
+"""The package's own format, beside those of `EXPORTS`."""
 
 
 def robot_panel(bench: Workbench) -> None:
@@ -43,8 +46,7 @@ def robot_panel(bench: Workbench) -> None:
             ("Open", "folder_open", open_dialog), ("Save", "save", _save),
             ("Save as", "save_as", save_dialog), ("Export", "file_download", export_dialog),
         ):  # fmt: skip
-            button = ui.button(words, icon=icon, on_click=partial(_act, bench, action))
-            button.props("flat dense no-caps").mark(words.lower().replace(" ", "-"))
+            tool(words, icon, partial(_act, bench, action)).mark(words.lower().replace(" ", "-"))
         document_buttons(bench.robot, "The robot file")
     title = ui.label().classes("studio-title").mark("robot-title")
     where = ui.label().classes("studio-soft").mark("robot-file")
@@ -61,8 +63,7 @@ def robot_panel(bench: Workbench) -> None:
             ui.label("What this robot's file did not say").classes("studio-subtitle")
             items = "".join(f"<li>{escape(line)}</li>" for line in bench.assumed)
             ui.html(f"<ul>{items}</ul>", sanitize=False)
-            done = ui.button("Seen", icon="check", on_click=bench.forget_assumed)
-            done.props("flat dense no-caps").mark("assumed-seen")
+            tool("Seen", "check", bench.forget_assumed).mark("assumed-seen")
 
     live_workspace_bar(bench)
     SettingsForm(bench.robot, first=FIRST, opened=OPENED, colored=("cables",))
@@ -156,19 +157,23 @@ async def export_dialog(bench: Workbench) -> None:
     """Hands out the robot in a format, one file or a zip archive of several."""
 
     async def download() -> None:
-        files, lost = exported(bench.robot.value, bench.robot.text, str(chosen.value))
+        robot, chosen = bench.robot.value, str(select.value)
+        files, lost = {f"{robot.name}.yaml": bench.robot.text}, None
+        if chosen != YAML:
+            files, lost = export_robot(robot, chosen), export_omissions(robot, chosen)
         name, text = next(iter(files.items()))
         content = text.encode()
         if len(files) > 1:
             name, content = f"{name.rpartition('_')[0] or 'robot'}.zip", _zipped(files)
         ui.download.content(content, name)
         if lost:
-            notify("\n".join(lost), "warning", stays=True)
+            notify("\n".join(omission_words(lost)), "warning", stays=True)
 
     with dialog("Export", "Download", download):
-        formats = {name: f"{name}: {words}" for name, words in export_formats().items()}
-        chosen = ui.select(formats, value=next(iter(formats)), label="Format")
-        chosen.props("dense outlined").classes("w-full").mark("export-format")
+        formats = {YAML: "cdpr_drake's robot file"} | EXPORTS
+        options = {name: f"{name}: {words}" for name, words in formats.items()}
+        select = ui.select(options, value=YAML, label="Format")
+        select.props("dense outlined").classes("w-full").mark("export-format")
 
 
 def _zipped(files: dict[str, str]) -> bytes:
@@ -202,7 +207,11 @@ def place_beside(bench: Workbench) -> None:
                 if name == str(other.value) and one is bench.robot.value:
                     table.content = pair_table(pairs, f"{one.name}, open", name)
 
-        bench.calculator.run(lambda: robots_side_by_side(one, bench.files.robot(name)), show)
+        def work() -> list[Pair]:
+            opened = bench.files.open(name)
+            return robots_side_by_side(one, bench.files.read(opened.text, opened.path))
+
+        bench.calculator.run(work, show)
 
     fold.on_value_change(unfold).mark("robot-beside")
     other.on_value_change(compare)

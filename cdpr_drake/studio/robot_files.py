@@ -14,8 +14,7 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from cdpr_drake.errors import CdprError, RobotFileError
-from cdpr_drake.formats.robot_exchange import export_robot, import_robot
-from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission_words
+from cdpr_drake.formats.robot_exchange import import_robot
 from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
@@ -32,9 +31,6 @@ MOST_UPLOADS = 8
 
 UPLOADS = tuple(suffix for suffix in ROBOT_SUFFIXES if suffix != ".csv")
 """Endings of files that can be uploaded; lists of models need the folders that they name."""
-
-YAML = "yaml"
-"""The package's own format, beside those of `formats.EXPORTS`."""
 
 NAMED_FILES = ("file", "filename", "meshdir", "texturedir", "assetdir", "url")
 """Attributes of XML files that name other files."""
@@ -100,15 +96,6 @@ class RobotFiles:
             raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
         return self._read_file(path, path.parent)
 
-    def robot(self, name: str) -> Robot:
-        """The robot that `open` would open.
-
-        Raises:
-            CdprError: See `open`.
-        """
-        opened = self.open(name)
-        return self.read(opened.text, opened.path)
-
     def _read_file(self, path: Path, folder: Path) -> OpenedRobot:
         """The robot of a file, which stands in a folder from now on."""
         notes: list[str] = []
@@ -167,27 +154,6 @@ def _put(folder: Path, name: str, content: bytes) -> Path:
     path = folder / plain
     path.write_bytes(content)
     return path
-
-
-def exported(robot: Robot, text: str, format: str) -> tuple[dict[str, str], list[str]]:
-    """Files of a robot in a format, by their names, and what that could not hold.
-
-    Args:
-        robot: The robot.
-        text: Its robot file.
-        format: `YAML`, or a name of `formats.EXPORTS`.
-
-    Raises:
-        RobotFileError: The format cannot hold this robot.
-    """
-    if format == YAML:
-        return {f"{robot.name}.yaml": text}, []
-    return export_robot(robot, format), omission_words(export_omissions(robot, format))
-
-
-def export_formats() -> dict[str, str]:
-    """Formats by name, with what each is."""
-    return {YAML: "cdpr_drake's robot file", **EXPORTS}
 
 
 def _check_names(path: Path) -> None:

@@ -156,7 +156,7 @@ class ScenarioForm:
         """Places the form into the current slot."""
         self._draft = draft
         with ui.row().classes("studio-bar"):
-            document_buttons(draft.document, "The scenario")
+            document_buttons(draft.document, "The scenario", "scenario-")
         self._problem = ui.label().classes("studio-problem").mark("scenario-problem")
         self._problem.bind_visibility_from(self._problem, "text", bool)
         changed = {item.partition("=")[0].partition(".")[0] for item in draft.settings()}

@@ -188,9 +188,9 @@ class SettingsForm:
             self._section(place)
             if rule.nullable:
                 edit = partial(with_value, place=place, value=None)
-                _button(f"Remove {name}", "delete", partial(self._change, edit))
+                tool(f"Remove {name}", "delete", partial(self._change, edit))
             return
-        _button(f"Add {name}", "add", partial(self._add, place, f"Add {name}", put))
+        tool(f"Add {name}", "add", partial(self._add, place, f"Add {name}", put))
 
     def _section(self, place: Place) -> None:
         """The fields of a section, or of an item of a list, then its own sections."""
@@ -362,10 +362,10 @@ class SettingsForm:
         boxes = [ui.element("div").classes("studio-parts") for _ in columns]
         what = f"{_words(name).rstrip('s')} {int(number) + 1}"
         with ui.row().classes("studio-tools"):
-            icon_button("more_horiz", f"More of {what}", lambda: self._more(place, what))
+            tool(f"More of {what}", "more_horiz", lambda: self._more(place, what), bare=True)
             copy = partial(_with_copy, place)
-            icon_button("content_copy", f"Duplicate {what}", lambda: self._change(copy))
-            icon_button("delete", f"Remove {what}", lambda: self._remove(place))
+            tool(f"Duplicate {what}", "content_copy", lambda: self._change(copy), bare=True)
+            tool(f"Remove {what}", "delete", lambda: self._remove(place), bare=True)
         for column, box in zip(columns, boxes, strict=True):
             self._field((*place, column), box)
 
@@ -486,10 +486,10 @@ def dialog(
     element.open()
 
 
-def document_buttons(document: Document[Any], title: str) -> None:
-    """Places buttons that undo, redo, and edit the whole text, in a dialog with a title."""
-    undo = icon_button("undo", "Undo, Ctrl-Z", document.undo).mark("undo")
-    redo = icon_button("redo", "Redo, Ctrl-Y", document.redo).mark("redo")
+def document_buttons(document: Document[Any], title: str, mark: str = "") -> None:
+    """Places buttons that undo, redo and edit the text; their marks begin with `mark`."""
+    undo = tool("Undo, Ctrl-Z", "undo", document.undo, bare=True).mark(f"{mark}undo")
+    redo = tool("Redo, Ctrl-Y", "redo", document.redo, bare=True).mark(f"{mark}redo")
 
     def refresh() -> None:
         undo.set_enabled(document.can_undo)
@@ -506,16 +506,12 @@ def document_buttons(document: Document[Any], title: str) -> None:
             text = ui.codemirror(document.text, language="YAML", line_wrapping=True)
             text.classes("w-full").style("height: 60vh").mark("whole-text")
 
-    _button("As text", "notes", show).mark("as-text")
+    tool("As text", "notes", show).mark(f"{mark}as-text")
     refresh()
     on_page(document.changed, refresh)
 
 
-def _button(words: str, icon: str, action: Callable[[], object]) -> ui.button:
-    return ui.button(words, icon=icon, on_click=action).props("flat dense no-caps")
-
-
-def icon_button(icon: str, words: str, action: Callable[[], object]) -> ui.button:
-    """Places a round button whose words are told by the pointer, and to who cannot see it."""
-    made = ui.button(icon=icon, on_click=action).props("flat round dense size=sm")
-    return made.props(f'aria-label="{words}" title="{words}"')
+def tool(words: str, icon: str, action: Callable[[], object], *, bare: bool = False) -> ui.button:
+    """Places a button, or its icon alone, whose words are told to who cannot see it."""
+    made = ui.button("" if bare else words, icon=icon, on_click=action).props("flat dense no-caps")
+    return made.props(f'round size=sm aria-label="{words}" title="{words}"') if bare else made
