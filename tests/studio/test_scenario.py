@@ -1,5 +1,7 @@
 """A scenario that is changed: its form, what is run of it, and what is refused."""
 
+from functools import partial
+
 import pytest
 
 from cdpr_drake.errors import CdprError, ScenarioError
@@ -10,7 +12,7 @@ from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.robot_files import RobotFiles
 from cdpr_drake.studio.scenario import COMMON, ScenarioDraft, ScenarioForm
-from cdpr_drake.studio.settings_form import SettingsForm, field_words, typed_value
+from cdpr_drake.studio.settings_form import SettingsForm, _with_copy, field_words, typed_value
 from cdpr_drake.studio.yaml_edit import with_value
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import robot_scenario_names, scenario_file
@@ -127,6 +129,25 @@ async def test_every_field_is_shown_and_means_what_it_was(documents):
             for place, rule, value in fields:
                 assert place in cells or (*place, 2) in cells
                 assert typed_value(rule, field_words(rule, value)) == plain_value(value)
+
+
+async def test_edits_that_need_each_other_are_taken_together(documents):
+    robot, forms = documents[0], []
+    start = robot.value.tension_bounds
+    async with simulated(lambda: forms.append(SettingsForm(robot, mark="form"))) as user:
+        type_into(user, "form-tension_bounds-lower", f"{start.upper + 10:g}")
+        await until(lambda: any("accepted: lower < upper" in words for words in problems(user)))
+        type_into(user, "form-platform-mass", "1.5")
+        await until(lambda: robot.value.platform.mass == 1.5)
+        assert robot.value.tension_bounds.lower == start.lower
+        assert field(user, "form-tension_bounds-lower").value == f"{start.upper + 10:g}"
+        type_into(user, "form-tension_bounds-upper", str(start.upper + 20))
+        await until(lambda: robot.value.tension_bounds.lower == start.upper + 10)
+        assert problems(user) == []
+        cables = len(robot.value.cables)
+        assert await forms[0].change(partial(_with_copy, ("cables", 0))) == ""
+        assert len(robot.value.cables) == cables + 1
+        await until(lambda: shown(user, f"form-cables-{cables}-name"))
 
 
 async def test_a_run_waits_for_what_is_not_accepted_yet(draft):
