@@ -396,7 +396,13 @@ class SettingsForm:
                 for at, rule in _required(self._rules(place))
             }
             for rule, field in fields.values():
-                field.props("dense outlined").classes("w-full").props["hint"] = rule.accepts()
+                hint = rule.accepts()
+                if rule.kind == "sections":  # what an item must have, as YAML
+                    keys = (
+                        f"{'.'.join(at)}: ..." for at, _ in _required(settings_of(rule.section))
+                    )
+                    hint += ", such as [{" + ", ".join(keys) + "}]"
+                field.props("dense outlined").classes("w-full").props["hint"] = hint
 
 
 def _with_copy(place: Place, text: str) -> str:
