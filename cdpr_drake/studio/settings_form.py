@@ -398,10 +398,8 @@ class SettingsForm:
             for rule, field in fields.values():
                 hint = rule.accepts()
                 if rule.kind == "sections":  # what an item must have, as YAML
-                    keys = (
-                        f"{'.'.join(at)}: ..." for at, _ in _required(settings_of(rule.section))
-                    )
-                    hint += ", such as [{" + ", ".join(keys) + "}]"
+                    keys = (f"{at[0]}: ..." for at, _ in _required(settings_of(rule.section)))
+                    hint += ", such as [{" + ", ".join(dict.fromkeys(keys)) + "}]"
                 field.props("dense outlined").classes("w-full").props["hint"] = hint
 
 
