@@ -183,7 +183,7 @@ class SettingsForm:
             self._table(place, len(value))
             name, put = name.removesuffix("s"), with_item
         elif value is None:
-            ui.label(rule.doc).classes("studio-soft")
+            ui.label(rule.doc if place[1:] else "").classes("studio-soft")  # a group has said it
         else:
             self._section(place)
             if rule.nullable:
