@@ -178,18 +178,19 @@ def dump_typed(settings: Any) -> str:
 def plain_values(settings: Any) -> dict[str, Any]:
     """Copies of settings as mappings, lists, words and numbers; None is left out."""
     values = {field.name: getattr(settings, field.name) for field in dataclasses.fields(settings)}
-    return {name: _plain(value) for name, value in values.items() if value is not None}
+    return {name: plain_value(value) for name, value in values.items() if value is not None}
 
 
-def _plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
+    """A copy of a setting as mappings, lists, words and numbers."""
     if dataclasses.is_dataclass(value):
         return plain_values(value)
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain_value(item) for item in value]
     if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
+        return {name: plain_value(item) for name, item in value.items()}
     return value
 
 

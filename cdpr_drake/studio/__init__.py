@@ -8,7 +8,8 @@ the token gets, and tells sessions by it; Drake's Meshcat is relayed to the same
 
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
   knows no page; what shows it connects to its signals.
-* `Document` is the robot as a text with undo and redo, changed only by what the checks accept.
+* `Document` is a robot or scenario as a text with undo and redo, changed only by what the checks
+  accept.
 * `PoseAnswer` is what is computed at the pose, by the verbs; `LiveWorkspace` the static workspace
   that follows a robot while it is changed. `RobotScene` draws both; `dragging.js` moves points.
 * `Calculator` is the one thread that has kernels and Meshcat, so that a page never waits for a
@@ -18,7 +19,7 @@ the token gets, and tells sessions by it; Drake's Meshcat is relayed to the same
 * `views` shows what any command left: numbers, verdicts, tables, figures, pages, files.
   `RunWatch` shows a run that goes on or is finished alike, with
   `MovingPlots` of its samples or of the rows of its log (`FinishedRun`).
-* `SchemaGroups` makes forms from schemas. `PANELS` is the table of panels.
+* `SettingsForm` is the form of a document, from its schema. `PANELS` is the table of panels.
 * `Job` is any `cdpr` command in a process of its own, `RunJob` a `cdpr simulate` that is followed
   and steered. All sessions share the server's jobs, so that a reload or a second tab loses no run.
   A `CommandBoard` starts commands, a `RunBoard` runs; both list what is in a folder of results.

@@ -14,9 +14,9 @@ from typing import Any, Generic, TypeVar
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
 from cdpr_drake.studio.verb_form import Verb
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 RESULTS = ("results.json", "summary.json")
 """Files that have a command's numbers; the first that is there."""

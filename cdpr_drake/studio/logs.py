@@ -22,12 +22,12 @@ from cdpr_drake.analyses.logs.replay import SUMMARY, TABLE
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.studio.folder import MOST_FILES, WorkingFolder
 from cdpr_drake.studio.panel import LOG, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import TICK, VerbPanel, VerbTab
 from cdpr_drake.studio.views import View, place_image
-from cdpr_drake.studio.workbench.working_folder import MOST_FILES, WorkingFolder
 
 TAB = VerbTab(
     folder="logs", result=LOG, verbs=("replay",), start="Compare",

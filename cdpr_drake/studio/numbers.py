@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from cdpr_drake.studio.workbench.side_by_side import Pair
+from cdpr_drake.studio.side_by_side import Pair
 
 
 def number_words(value: float | None, digits: int = 4, kind: str = "g") -> str:

@@ -56,7 +56,7 @@ class Panel:
 
 
 PANELS = {
-    "robot": Panel("Robot", "precision_manufacturing", "panels.robot:robot_panel"),
+    "robot": Panel("Robot", "precision_manufacturing", "robot:robot_panel"),
     "pose": Panel("Pose", "open_with", "pose:pose_panel", {POSE_NUMBERS: "Numbers"}),
     "workspace": Panel(
         "Workspace", "view_in_ar", "workspace:workspace_panel", {WORKSPACES: "Workspaces"}

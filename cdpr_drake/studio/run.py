@@ -14,13 +14,12 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
-from cdpr_drake.studio.panels.scenario_form import ScenarioForm
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import RunBoard
+from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import send_file
 from cdpr_drake.studio.watch import RunWatch
-from cdpr_drake.studio.workbench.scenario_draft import ROBOT, ScenarioDraft
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -149,7 +148,7 @@ class RunPanel:
         is_own, fits = subject is not None and not subject.is_another(now), True
         words = f"Runs {now.robot}, the robot that is open"
         try:
-            draft.change(ROBOT, own if is_own else robot_argument(self._bench))
+            draft.robot = own if is_own else robot_argument(self._bench)
             words += "." if is_own else f", instead of the scenario's {own}."
         except CdprError as problem:
             words, fits = f"Nothing can be started: {problem}.", False

@@ -34,7 +34,7 @@ from cdpr_drake.studio.jobs import Job, JobManager, JobState
 from cdpr_drake.studio.plots import Chart, charts_of
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run_scene import RunScene
-from cdpr_drake.studio.workbench.scenario_draft import ScenarioDraft
+from cdpr_drake.studio.scenario import ScenarioDraft
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
 from cdpr_drake.systems.scenarios.files import check_moves_robot

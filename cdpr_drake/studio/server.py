@@ -21,11 +21,11 @@ from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.door import BENCH, TOKEN, Door, Sessions
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import SCENE, make_page
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench
 from cdpr_drake.studio.verb_form import Verb
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")
 """What is accepted as a token, which has to stand in an address as it is."""

@@ -21,8 +21,8 @@ from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.plots import MovingPlots, plot_row
 from cdpr_drake.studio.runs import NO_RUN, FinishedRun, RunBoard, RunEntry, RunJob, Sample, read_run
 from cdpr_drake.studio.session import Workbench
+from cdpr_drake.studio.side_by_side import Pair
 from cdpr_drake.studio.views import leaves, show_results
-from cdpr_drake.studio.workbench.side_by_side import Pair
 
 SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
 """The scene is drawn when the browser has drawn its plots, at most once in so many times what it

@@ -25,7 +25,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.models.robot_statics import check_pose, tension_problem
 from cdpr_drake.schema.declarations import Refusal, Scope, told
-from cdpr_drake.schema.typed_yaml import load_typed
+from cdpr_drake.schema.typed_yaml import load_typed, parse_typed
 from cdpr_drake.systems.diagrams.mechanism_control import (
     mechanism_refusals,
 )
@@ -48,7 +48,6 @@ from cdpr_drake.systems.scenarios.pick_and_place_scenario import (
     PickAndPlaceScenario,
     pick_and_place_refusals,
 )
-from cdpr_drake.systems.scenarios.run_settings import ScenarioHeader
 from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 from cdpr_drake.systems.sections import sections_of
@@ -240,25 +239,47 @@ def load_scenario(
     """
     name = str(name)
     kind = scenario_kind(name)
-    path, (of_kind, more) = scenario_file(name), SCENARIO_SCHEMAS[kind]
+    path, (of_kind, _) = scenario_file(name), SCENARIO_SCHEMAS[kind]
     if schema is not None and not issubclass(schema, of_kind):
         raise ScenarioError(
             f"{path}: kind: found {kind}, not described by {schema.__name__}; "
             f"accepted: {of_kind.__name__}, or a subclass of it with more sections"
         )
-    moves_robot = issubclass(of_kind, ScenarioHeader)
-
-    def scope(scenario: Any) -> Scope:
-        found = (robot_scope if moves_robot else mechanism_scope)(scenario, path)
-        if moves_robot:
-            check_robot_motion(found.robot, path)
-        return replace(found, more=more)
-
     try:
         return load_typed(
-            schema or of_kind, path, error=ScenarioError, overrides=overrides, scope=scope
-        )
+            schema or of_kind, path, error=ScenarioError, overrides=overrides,
+            scope=_scope_of(kind, path),
+        )  # fmt: skip
     except ScenarioError as problem:
-        if not moves_robot:
+        if kind == MECHANISM:
             raise
         raise ScenarioError(*problem.problems, *unknown_robot(path, overrides)) from problem
+
+
+def parse_scenario(content: str, path: Path, overrides: Sequence[str] = ()) -> Any:
+    """As `load_scenario`, from another text of a scenario's file, of the same kind.
+
+    Args:
+        content: YAML.
+        path: The file, which messages name.
+        overrides: As for `load_scenario`.
+
+    Raises:
+        ScenarioError: As `load_scenario`.
+        RobotFileError: As `load_scenario`.
+    """
+    kind = scenario_kind(str(path))
+    schema, scope = SCENARIO_SCHEMAS[kind][0], _scope_of(kind, path)
+    return parse_typed(schema, content, path, error=ScenarioError, overrides=overrides, scope=scope)
+
+
+def _scope_of(kind: str, path: Path) -> Callable[[Any], Scope]:
+    """What finds a scenario's robot or mechanism."""
+
+    def scope(scenario: Any) -> Scope:
+        found = (mechanism_scope if kind == MECHANISM else robot_scope)(scenario, path)
+        if kind != MECHANISM:
+            check_robot_motion(found.robot, path)
+        return replace(found, more=SCENARIO_SCHEMAS[kind][1])
+
+    return scope

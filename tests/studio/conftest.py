@@ -111,8 +111,8 @@ READ_IN_LOOP: list[str] = []
 """Files that the package read in the thread of an event loop, and from where."""
 
 
-HANDLERS = tuple(f"/studio/{name}" for name in ("panels/", "page", "panel_pages", "sessions",
-                "run.py", "watch", "logs", "studies", "views", "plots"))  # fmt: skip
+HANDLERS = tuple(f"/studio/{name}" for name in ("robot.py", "settings_form", "page",
+                "sessions", "run.py", "watch", "logs", "studies", "views", "plots"))  # fmt: skip
 """What calls for reading in a page; a test may read what it likes."""
 
 

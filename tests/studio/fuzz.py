@@ -90,6 +90,7 @@ async def _type(user, bench, chance: random.Random, marks: list[str]) -> str:
     shown, element.value = element.value, words
     x.trigger("keydown.enter")
     await asyncio.sleep(0)
+    await bench.robot.settled()
     if bench.robot.text != before or coordinates != bench.coordinates:
         return "accepted"
     if words.strip() == str(shown):
@@ -101,6 +102,7 @@ async def _type(user, bench, chance: random.Random, marks: list[str]) -> str:
     user.notify.messages.clear()
     element.value = shown
     x.trigger("keydown.enter")
+    await asyncio.sleep(0)
     return "refused" if said else "unchanged"
 
 

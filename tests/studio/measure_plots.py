@@ -36,7 +36,7 @@ def main(picture=""):
         with chromium(Path(profile), (1280, 1000)) as page, served(folder, str(scenario)) as server:
             page.get(server[0])
             press(page, "Run")
-            wait_for(page, "document.querySelector('.cdpr-field') !== null")
+            wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
             press(page, "Start")
             wait_for(page, "document.querySelector('.cdpr-state').innerText === 'running'")
             wait_for_start(page, f"{FRAMES}[1] > 20")

@@ -8,9 +8,9 @@ from nicegui.testing.user_simulation import user_simulation
 
 from cdpr_drake.cli.studio import verbs
 from cdpr_drake.studio.calculator import Calculator
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 
 
 @asynccontextmanager

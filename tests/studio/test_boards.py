@@ -9,8 +9,8 @@ import pytest
 from cdpr_drake.cli.studio import verbs
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import VerbBoard, VerbJob
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import until
 
 LONGEST = 120.0

@@ -12,10 +12,10 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import live_workspace
 from cdpr_drake.studio import session as sessions
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.live_workspace import COARSE, FINE, sketch_grid, sketch_workspace
 from cdpr_drake.studio.scene import SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, type_into, until
 
 ROBOT = "acrobot_large"

@@ -9,9 +9,9 @@ import pytest
 
 from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.errors import CdprError
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.logs import TAB, log_contents, log_files, read_comparison
 from cdpr_drake.studio.verb_panel import view_of
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT = "acrobot_small"

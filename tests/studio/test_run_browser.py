@@ -31,7 +31,7 @@ def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
     with cleared(started_browser, window) as page, served(folder, str(scenario)) as (address, _):
         page.get(address)
         press(page, "Run")
-        wait_for(page, "document.querySelector('.cdpr-field') !== null")
+        wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
         press(page, "Start")
         wait_for_start(page, f"{FRAMES}[1] > 3")
         wait_for(page, CAMERA)

@@ -14,13 +14,13 @@ from cdpr_drake.analyses.runs.steering import Message
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import runs
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager, JobState
 from cdpr_drake.studio.plots import plot_row
 from cdpr_drake.studio.run import _boards, run_panel
 from cdpr_drake.studio.runs import RunJob, read_run
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.watch import run_pairs
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.studio.conftest import RUN_SETTINGS
 from tests.studio.pages import field, shown, simulated, until

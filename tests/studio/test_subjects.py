@@ -11,8 +11,8 @@ from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.run import _boards
 from cdpr_drake.studio.verb_panel import view_of
-from cdpr_drake.studio.workbench.yaml_edit import with_value
 from cdpr_drake.studio.workspace import TAB, _views
+from cdpr_drake.studio.yaml_edit import with_value
 from tests.studio.pages import field, open_panel, problems, shown, until
 
 ROBOT, OTHER = "acrobot_small", "planar"
@@ -169,7 +169,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     says = lambda words: words in field(user, "run-robot").text  # noqa: E731
     await until(lambda: says(f"Runs {ROBOT}, the robot that is open."))
     bench.open("acrobot_large")
-    await until(lambda: board.draft.settings() == ('robot="acrobot_large"',))
+    await until(lambda: board.draft.settings() == ("robot=acrobot_large",))
     assert board.draft.check().robot == "acrobot_large"
     await until(lambda: says(f"instead of the scenario's {ROBOT}"))
     bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
@@ -193,6 +193,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
 
 async def test_two_robots_and_two_runs_are_shown_beside_each_other(user, bench):
     field(user, "robot-beside").value = True
+    await until(lambda: "acrobot_large" in field(user, "other-robot").options)
     field(user, "other-robot").value = "acrobot_large"
     await until(lambda: "platform mass [kg]" in field(user, "robot-pairs").content)
     before = field(user, "robot-pairs").content

@@ -10,8 +10,8 @@ from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.cli.studio import NOT_OFFERED, verbs
 from cdpr_drake.errors import CdprError
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.verb_form import FieldProblem, Verb
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
 from tests.studio.pages import field, shown, simulated, until
 
 ROBOT = "acrobot_small"

@@ -10,12 +10,12 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
 from cdpr_drake.studio.calculator import Calculator
+from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.pose import answer_html
 from cdpr_drake.studio.pose_answer import PoseCoordinates, RobotQuestions
 from cdpr_drake.studio.scene import EXITS, R_EW, look_at_robot
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.workbench.working_folder import WorkingFolder
-from cdpr_drake.studio.workbench.yaml_edit import with_value
+from cdpr_drake.studio.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
 
 ROUNDING = 1e-9

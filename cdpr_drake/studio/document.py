@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -10,9 +11,6 @@ from typing import Generic, TypeVar
 from cdpr_drake.studio.calculator import Signal
 
 T = TypeVar("T")
-
-_State = tuple[str, T, Path]
-"""Text, what it means, and its file."""
 
 MOST_STEPS = 200
 """Changes that can be undone."""
@@ -39,11 +37,10 @@ class Document(Generic[T]):
         Raises:
             CdprError: The text is not accepted.
         """
-        self._read = read
-        self.path, self.changed = path, Signal()
-        self.text, self.value = text, read(text, path)
-        self._undone: list[_State[T]] = []
-        self._done: list[_State[T]] = []
+        self._read, self.changed = read, Signal()
+        self.text, self.value, self.path = text, read(text, path), path
+        self._states, self._now = [(text, self.value, path)], 0
+        self._editing = asyncio.Lock()
 
     def change(self, text: str, path: Path | None = None) -> None:
         """Takes another text, as one step that can be undone.
@@ -56,14 +53,41 @@ class Document(Generic[T]):
             CdprError: The text is not accepted; nothing has changed.
         """
         path = path or self.path
-        if text == self.text and path == self.path:
-            return
-        value = self._read(text, path)
-        self._done.append((self.text, self.value, self.path))
-        del self._done[:-MOST_STEPS]
-        self._undone.clear()
-        self.text, self.value, self.path = text, value, path
-        self.changed.emit()
+        if (text, path) != (self.text, self.path):
+            self._take(text, self._read(text, path), path)
+
+    async def edit(self, edit: Callable[[str], str]) -> None:
+        """Changes the text by a function of it; another thread reads what comes out.
+
+        Raises:
+            CdprError: The text is not accepted; nothing has changed.
+        """
+        async with self._editing:
+            while True:
+                before, path = self.text, self.path
+                text = edit(before)
+                if text == before:
+                    return
+                value = await asyncio.to_thread(self._read, text, path)
+                if (self.text, self.path) == (before, path):  # else it was changed meanwhile
+                    break
+            self._take(text, value, path)
+
+    async def settled(self) -> None:
+        """Waits for edits that are being read."""
+        async with self._editing:
+            pass
+
+    def _take(self, text: str, value: T, path: Path) -> None:
+        self._states[self._now + 1 :] = [(text, value, path)]
+        del self._states[: -MOST_STEPS - 1]
+        self._go(len(self._states) - 1)
+
+    def _go(self, step: int) -> None:
+        if 0 <= step < len(self._states):
+            self._now = step
+            self.text, self.value, self.path = self._states[step]
+            self.changed.emit()
 
     def belongs_to(self, path: Path) -> None:
         """Says that the text stands in another file from now on, and stood there before.
@@ -72,36 +96,29 @@ class Document(Generic[T]):
             CdprError: It is not accepted there, where files that it names are missing.
         """
         value, before = self._read(self.text, path), self.path
-        for states in (self._done, self._undone):
-            for k, (text, known, where) in enumerate(states):
-                states[k] = (text, known, path if where == before else where)
-        self.value, self.path = value, path
-        self.changed.emit()
+        self._states = [
+            (text, known, path if where == before else where) for text, known, where in self._states
+        ]
+        self._states[self._now] = (self.text, value, path)
+        self._go(self._now)
 
     @property
     def can_undo(self) -> bool:
         """Whether there is a change to undo."""
-        return bool(self._done)
+        return self._now > 0
 
     @property
     def can_redo(self) -> bool:
         """Whether there is a change to do again."""
-        return bool(self._undone)
+        return self._now + 1 < len(self._states)
 
     def undo(self) -> None:
         """Takes the last change back, if there is one."""
-        self._step(self._done, self._undone)
+        self._go(self._now - 1)
 
     def redo(self) -> None:
         """Does again what was undone last, if there is something."""
-        self._step(self._undone, self._done)
-
-    def _step(self, source: list[_State[T]], target: list[_State[T]]) -> None:
-        if not source:
-            return
-        target.append((self.text, self.value, self.path))
-        self.text, self.value, self.path = source.pop()
-        self.changed.emit()
+        self._go(self._now + 1)
 
     def words(self, problem: Exception, *, lines: bool = False) -> list[str]:
         """What is wrong with a text that was not accepted, without the name of the file.
@@ -110,7 +127,8 @@ class Document(Generic[T]):
             problem: What `change` raised.
             lines: Whether the numbers of lines stay.
         """
-        said, name = str(problem).split("\n"), re.escape(str(self.path))
-        if lines:
-            return [re.sub(rf"^{name}:(\d+): ", r"line \1: ", line) for line in said]
-        return [re.sub(rf"^{name}(:\d+)?: ", "", line) for line in said]
+        file = rf"^{re.escape(str(self.path))}(?::(\d+))?: "
+        return [
+            re.sub(file, lambda at: f"line {at[1]}: " if lines and at[1] else "", line)
+            for line in str(problem).split("\n")
+        ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from itertools import chain, islice
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
@@ -32,7 +33,7 @@ class WorkingFolder:
             CdprError: The name leads out of the folder, also by a link, or is none.
         """
         name = name.strip()
-        if not name or "\0" in name or not name.isprintable():
+        if not name or not name.isprintable():
             raise CdprError(f"name: found {name!r}; accepted: a name in the working folder")
         try:
             path = (self.root / name).resolve()
@@ -50,15 +51,12 @@ class WorkingFolder:
 
     def files(self, suffixes: tuple[str, ...]) -> list[str]:
         """Names of files with these endings, here and one folder below, sorted."""
-        found: list[str] = []
-        for pattern in ("*", "*/*"):
-            for path in sorted(self.root.glob(pattern)):
-                hidden = any(part.startswith(".") for part in path.relative_to(self.root).parts)
-                if path.suffix.lower() in suffixes and not hidden and path.is_file():
-                    found.append(self.shown(path))
-                if len(found) >= MOST_FILES:
-                    return found
-        return found
+        paths = chain.from_iterable(sorted(self.root.glob(at)) for at in ("*", "*/*"))
+        names = (
+            self.shown(path) for path in paths
+            if path.suffix.lower() in suffixes and path.is_file()
+        )  # fmt: skip
+        return list(islice((name for name in names if f"/{name}".find("/.") < 0), MOST_FILES))
 
     def write(self, name: str, text: str, overwrite: bool) -> Path:
         """Writes a file at once, or not at all.

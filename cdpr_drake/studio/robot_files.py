@@ -1,0 +1,177 @@
+"""Robots in and out of files: names, the working folder, uploads, other tools' formats.
+
+What is read is data: YAML without tags, XML without entities, nothing that is executed. A file can
+name others, as a robot its mesh or MJCF what it includes; those have to lie in the working folder,
+or where the robot itself is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from tempfile import TemporaryDirectory
+from xml.etree import ElementTree
+
+from cdpr_drake.errors import CdprError, RobotFileError
+from cdpr_drake.formats.robot_exchange import import_robot
+from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
+from cdpr_drake.models.file_kinds import is_foreign
+from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
+from cdpr_drake.models.robot_schema import Robot
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml, too_many_bytes
+from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.yaml_edit import value_in
+
+LARGEST_UPLOAD = 4_194_304
+"""Of a file of another tool [bytes], as its readers have it."""
+
+MOST_UPLOADS = 8
+"""Files at once; a CASPR model has several."""
+
+UPLOADS = tuple(suffix for suffix in ROBOT_SUFFIXES if suffix != ".csv")
+"""Endings of files that can be uploaded; lists of models need the folders that they name."""
+
+NAMED_FILES = ("file", "filename", "meshdir", "texturedir", "assetdir", "url")
+"""Attributes of XML files that name other files."""
+
+
+@dataclass(frozen=True)
+class OpenedRobot:
+    """A robot that was read.
+
+    Attributes:
+        text: That of a robot file.
+        path: Where messages say that it stands.
+        notes: What to know of a file of another tool, a sentence each.
+    """
+
+    text: str
+    path: Path
+    notes: list[str]
+
+
+class RobotFiles:
+    """Reads and writes robots for a workbench."""
+
+    def __init__(self, folder: WorkingFolder, also: Path | None = None) -> None:
+        """Of a working folder, and of one more folder that the user has named at the start."""
+        self._folder = folder
+        self._roots = [folder.root, robot_file(robot_names()[0]).parent.parent.resolve()]
+        if also is not None:
+            self._roots.append(also.resolve())
+
+    def read(self, text: str, path: Path) -> Robot:
+        """A robot from the text of a robot file.
+
+        Raises:
+            RobotFileError: The text is too long, does not describe a possible robot, or names a
+                file that lies elsewhere.
+        """
+        try:
+            mesh = value_in(load_yaml(text), ("platform", "shape", "file"))
+        except YamlTextError:
+            mesh = None  # the reader of robots says what is wrong
+        try:
+            where = (path.parent / mesh).resolve() if isinstance(mesh, str) else self._roots[0]
+        except (OSError, ValueError, RuntimeError):
+            where = Path("/")
+        if not any(where.is_relative_to(root) for root in self._roots):
+            raise RobotFileError(
+                f"{path}: platform.shape.file: found {mesh[:80]!r}, outside of the working "
+                "folder; accepted: a file in it"
+            )
+        return parse_robot(text, path)
+
+    def open(self, name: str) -> OpenedRobot:
+        """A robot of the package by name, or the file of the working folder of that name.
+
+        Raises:
+            CdprError: There is none, its file leads out of the folder, or it is not accepted.
+        """
+        if name in robot_names():
+            return OpenedRobot(robot_text(name), robot_file(name).resolve(), [])
+        path = self._folder.path(name)
+        if not path.is_file():
+            raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
+        return self._read_file(path, path.parent)
+
+    def _read_file(self, path: Path, folder: Path) -> OpenedRobot:
+        """The robot of a file, which stands in a folder from now on."""
+        notes: list[str] = []
+        if path.suffix.lower() not in UPLOADS:
+            raise RobotFileError(
+                f"{path.name[:100]}: found the ending {path.suffix[:20]!r}; accepted: "
+                f"{', '.join(UPLOADS)}"
+            )
+        if is_foreign(path):
+            _check_names(path)
+            imported = import_robot(path)
+            completed, text = imported.completed, imported.yaml()
+            notes = [f"read as {imported.tool}"]
+            notes += [f"assumed {key}: {words}" for key, words in completed.assumed.items()]
+            notes += [words.replace(f"{path.parent}/", "") for words in completed.remarks]
+            path = path.with_suffix(".yaml")
+        else:
+            large = too_many_bytes(path)
+            if large:
+                raise RobotFileError(f"{path.name}: {large}")
+            try:
+                text = path.read_text(encoding="utf-8")
+            except UnicodeDecodeError as problem:
+                raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
+        self.read(text, folder / path.name)
+        return OpenedRobot(text, folder / path.name, notes)
+
+    def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
+        """A robot from files that came over the network, by their names; one, or those of a model.
+
+        Raises:
+            CdprError: They are too many or too large, or none of them is accepted as a robot.
+        """
+        if not 0 < len(files) <= MOST_UPLOADS:
+            raise RobotFileError(f"found {len(files)} files; accepted: 1 to {MOST_UPLOADS}")
+        with TemporaryDirectory(prefix="cdpr-studio-") as scratch:
+            paths = [_put(Path(scratch), *item) for item in files.items()]
+            problems: list[str] = []
+            for path in paths:
+                try:
+                    return self._read_file(path, self._folder.root)
+                except CdprError as problem:
+                    problems += str(problem).replace(f"{scratch}/", "").split("\n")
+        raise RobotFileError(*problems)
+
+
+def _put(folder: Path, name: str, content: bytes) -> Path:
+    """Writes a file that came over the network."""
+    plain = PurePath(name.replace("\\", "/")).name
+    if not plain or plain.startswith(".") or not plain.isprintable() or len(plain) > 100:
+        raise RobotFileError(f"name: found {name[:80]!r}; accepted: the name of a file")
+    if len(content) > LARGEST_UPLOAD:
+        raise RobotFileError(
+            f"{plain}: found {len(content):,} bytes; accepted: at most {LARGEST_UPLOAD:,}"
+        )
+    path = folder / plain
+    path.write_bytes(content)
+    return path
+
+
+def _check_names(path: Path) -> None:
+    """Refuses XML that names files elsewhere, before anybody follows them."""
+    if path.suffix.lower() in (".yaml", ".yml", ".json") or path.stat().st_size > LARGEST_UPLOAD:
+        return  # which name none, or are refused for their size
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except (ElementTree.ParseError, ValueError, LookupError):
+        return  # the reader says what is wrong
+    for element in root.iter():
+        tag, names = str(element.tag), [element.get(key, "") for key in NAMED_FILES]
+        if tag.rpartition("}")[2] in ("uri", "include"):
+            names.append((element.text or "").strip())
+        for words in names:
+            where = words.partition("://")[2] if "://" in words else words
+            if where.startswith(("/", "\\", "~")) or ".." in PurePath(where).parts:
+                raise RobotFileError(
+                    f"{path.name}: <{tag[:40]}>: found {words[:80]!r}, a file elsewhere; accepted: "
+                    "names of files beside it"
+                )

@@ -1,0 +1,179 @@
+"""A scenario that is changed and run: its text as a document, what is run of it, and its form."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from nicegui import run, ui
+
+import cdpr_drake
+from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
+from cdpr_drake.errors import CdprError, ScenarioError
+from cdpr_drake.schema.declarations import settings_of
+from cdpr_drake.schema.input_files import input_text
+from cdpr_drake.schema.typed_yaml import plain_value, plain_values
+from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
+from cdpr_drake.studio.document import Document
+from cdpr_drake.studio.panel import message
+from cdpr_drake.studio.settings_form import SettingsForm, document_buttons
+from cdpr_drake.studio.yaml_edit import flow
+from cdpr_drake.systems.diagrams.load import load_scenario, parse_scenario
+from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_file
+
+COMMON = (
+    "duration", "seed", "camera.kind", "controller.scheme", "controller.lambda_0",
+    "controller.lambda_infinity", "estimator.kind", "distribution.method", "controller.stiffness",
+    "controller.damping", "integration.engine", "log_rate",
+)  # fmt: skip
+"""Fields that most people change, those of them that a scenario has."""
+
+FIXED = ("kind", "name", "title", "source", "robot")
+"""Fields that a form does not have; a run is of the robot that is open."""
+
+
+class ScenarioDraft:
+    """A scenario by name or by path, and what is changed of it.
+
+    Attributes:
+        name: Name of one of the package, or absolute path of a file in the working folder.
+        document: Its text with the changes.
+        own_robot: The robot of the file, by its name or the path of its file.
+        robot: The robot that is run, likewise.
+    """
+
+    def __init__(self, name: str, folder: Path) -> None:
+        """Reads it.
+
+        Args:
+            name: As the attribute.
+            folder: Working folder.
+
+        Raises:
+            CdprError: It is not accepted, or names files outside of the folder.
+        """
+        self.name, self._folder = name, folder.resolve()
+        check_moves_robot(name, "the studio")
+        path = scenario_file(name).absolute()
+        self._file = self._checked(load_scenario(name))
+        self.own_robot = self.robot = str(self._file.robot)
+        text = input_text(path)
+        self._texts = set(texts(load_yaml(text)))
+        self.document: Document[Any] = Document(text, path, self._read)
+
+    def _read(self, text: str, path: Path) -> Any:
+        """The scenario of a text with the robot that is run; files elsewhere are not read."""
+        with suppress(YamlTextError):  # the parser says what is wrong
+            for key, words in set(texts(load_yaml(text))) - self._texts:
+                bases = (self._folder, path.parent)
+                if key in ("kind", "robot"):
+                    accepted = "that of the file; the robot that is open is run"
+                elif "/" in words and not any(_is_in(base / words, self._folder) for base in bases):
+                    accepted = "a file in the working folder"
+                else:
+                    continue
+                raise ScenarioError(f"{path}: {key}: found {words[:80]}; accepted: {accepted}")
+        overrides = () if self.robot == self.own_robot else (f"robot={flow(self.robot)}",)
+        return self._checked(parse_scenario(text, path, overrides))
+
+    def _checked(self, scenario: Any) -> Any:
+        """Refuses scenarios that name files outside of the working folder and of the package."""
+        package = Path(cdpr_drake.__file__).resolve().parent
+        shipped = [package, *(package.parent / name for name in ("models", "systems"))]
+        for key, words in texts(plain_values(scenario)):
+            if Path(words).is_absolute() and not _is_in(Path(words), self._folder, *shipped):
+                raise ScenarioError(
+                    f"{scenario.name}: {key}: found {words[:80]}; accepted: a file in the working "
+                    "folder"
+                )
+        return scenario
+
+    def settings(self) -> tuple[str, ...]:
+        """What --set is given."""
+        items = differences(self._file, self.document.value)
+        made = [item for item in items if not item.startswith("robot=")]
+        if self.robot != self.own_robot:
+            made.append(f"robot={flow(self.robot)}")
+        return tuple(made)
+
+    def by_hand(self) -> tuple[str, ...]:
+        """What --set is given besides, so that cables can be broken and the platform pushed.
+
+        Of the sections that this takes, those that the scenario has not and accepts.
+        """
+        made: list[str] = []
+        for key, least in UNTOUCHED.values():
+            if getattr(self.document.value, key, "") is None:
+                with suppress(CdprError):
+                    load_scenario(self.name, (*self.settings(), *made, f"{key}={least}"))
+                    made.append(f"{key}={least}")
+        return tuple(made)
+
+    def check(self) -> Any:
+        """The scenario as it would be run.
+
+        Raises:
+            CdprError: It is not accepted.
+        """
+        scenario = self._checked(load_scenario(self.name, self.settings()))
+        check_steered(scenario)
+        return scenario
+
+
+def differences(before: Any, now: Any, above: str = "") -> Iterator[str]:
+    """Items key=value by which settings differ, as --set takes them: lists whole, null for none."""
+    for name, rule in settings_of(type(before)).items():
+        old, new, key = getattr(before, name), getattr(now, name), f"{above}{name}"
+        if rule.kind == "section" and old is not None and new is not None:
+            yield from differences(old, new, f"{key}.")
+        elif plain_value(old) != plain_value(new):
+            yield f"{key}={flow(plain_value(new))}"
+
+
+def texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:
+    """Words in plain values, with their keys."""
+    if isinstance(value, str):
+        yield key, value
+    inside = value if isinstance(value, dict) else {}
+    if isinstance(value, list):
+        inside = dict(enumerate(value))
+    for name, inner in inside.items():
+        yield from texts(inner, f"{key}.{name}".removeprefix("."))
+
+
+def _is_in(path: Path, *folders: Path) -> bool:
+    with suppress(OSError, RuntimeError, ValueError):
+        return any(path.resolve().is_relative_to(folder) for folder in folders)
+    return False
+
+
+class ScenarioForm:
+    """The fields of a draft, and buttons to undo and to edit the text."""
+
+    def __init__(self, draft: ScenarioDraft) -> None:
+        """Places the form into the current slot."""
+        self._draft = draft
+        with ui.row().classes("studio-bar"):
+            document_buttons(draft.document, "The scenario", "scenario-")
+        self._problem = ui.label().classes("studio-problem").mark("scenario-problem")
+        self._problem.bind_visibility_from(self._problem, "text", bool)
+        changed = {item.partition("=")[0].partition(".")[0] for item in draft.settings()}
+        self._form = SettingsForm(
+            draft.document, mark="field", common=[tuple(key.split(".")) for key in COMMON],
+            without=FIXED, opened=tuple(changed), lazy=True,
+        )  # fmt: skip
+
+    async def check(self) -> bool:
+        """Whether the draft can be run as it is shown; says why not."""
+        self._problem.text = ""
+        refused = await self._form.settle()
+        if refused:
+            self._problem.text = f"not accepted yet: {', '.join(refused)}"
+            return False
+        try:
+            await run.io_bound(self._draft.check)
+        except (CdprError, OSError) as problem:
+            self._problem.text = message(problem)
+        return not self._problem.text
