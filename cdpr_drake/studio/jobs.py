@@ -52,7 +52,6 @@ MOST_JOBS = 200
 
 _PROGRESS = re.compile(rf"{PROGRESS}(?:(?P<title>.*?): +(?P<percent>\d+) %, )?(?P<words>.*)")
 _ERROR = "cdpr: "
-_numbers = itertools.count(1)
 
 
 class JobState(StrEnum):
@@ -75,7 +74,6 @@ class Job:
 
     Attributes:
         program: What is run with the arguments.
-        number: Its number among the jobs of this server, from 1.
         title: What it is, in a few words.
         arguments: Of the command, from the name of the subcommand on.
         working: Folder that it is run in.
@@ -93,10 +91,8 @@ class Job:
         self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None
     ) -> None:
         """Queued; arguments as the attributes, an option --json is up to the caller."""
-        self.number = next(_numbers)
         self.title, self.arguments, self.working = title, tuple(arguments), working
-        self.folder = folder
-        self.state, self.message = JobState.QUEUED, ""
+        self.folder, self.state, self.message = folder, JobState.QUEUED, ""
         self.progress: tuple[float | None, str] = (None, "")
         self.lines: list[str] = []
         self.changed: Callable[[], None] = lambda: None
@@ -128,7 +124,7 @@ class Job:
     def begin(self) -> None:
         """Starts to work; a failure of that is one of the job."""
         self._started = time.monotonic()
-        self._task = asyncio.create_task(self._work(), name=f"job {self.number}")
+        self._task = asyncio.create_task(self._work(), name=self.title)
         self.set_state(JobState.RUNNING)
 
     def stop(self, wish: signal.Signals = signal.SIGTERM) -> None:
@@ -260,10 +256,6 @@ class JobManager:
         self.at_once = at_once or max(1, len(os.sched_getaffinity(0)) - 1)
         self.jobs: list[Job] = []
         self._closed = False
-
-    def job(self, number: int) -> Job | None:
-        """The job of a number; None: there is none any more."""
-        return next((job for job in self.jobs if job.number == number), None)
 
     @property
     def is_busy(self) -> bool:

@@ -15,7 +15,7 @@ from cdpr_drake.geometry.poses import pose_from_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.studio.results import Subject
-from cdpr_drake.studio.scene import WORKSPACE, RobotScene
+from cdpr_drake.studio.scene import WORKSPACE, RobotScene, look_at_robot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.systems.robots.settings import CableSettings
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
@@ -92,7 +92,9 @@ def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
     if not isinstance(scenario, Scenario):
         servo, world = None, scenario.world
         cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
-    return RobotPicture(
+    picture = RobotPicture(
         robot, robot.tension_limits()[1], servo, cables, meshcat=scene.meshcat, world=world,
         colors=[nth_look(k).color for k in range(len(robot.cables))],
     )  # fmt: skip
+    look_at_robot(scene.meshcat, robot)
+    return picture

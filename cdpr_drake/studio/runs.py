@@ -159,7 +159,7 @@ class RunJob(Job):
                 while True:
                     loop.call_soon_threadsafe(self.take, receive(connection))
 
-        Thread(target=listen, name=f"run {self.number}", daemon=True).start()
+        Thread(target=listen, name=self.title, daemon=True).start()
         await super()._work()
         self._connection = None
 

@@ -1,11 +1,8 @@
-"""Scenes in Meshcat: the robot of a workbench, and the robot of a run.
-
-`RobotScene` draws cables and points in the colours of their numbers; `RunScene` draws a run.
-"""
+"""The scene of a workbench in Meshcat: its robot, with cables and points in their colours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -17,15 +14,9 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, priva
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.arrays import Array
-from cdpr_drake.cables.models import ELASTIC
-from cdpr_drake.geometry.poses import pose_from_row
-from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look, rgb
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
-from cdpr_drake.systems.robots.settings import CableSettings
-from cdpr_drake.systems.scenarios.tension_control_scenario import TensionScenario
-from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 EXITS, ANCHORS = "studio/exit", "studio/anchor"
 """Paths of the points in the scene, below which each has its number."""
@@ -185,40 +176,3 @@ def _solids(robot: Robot) -> str:
 
 Draw = Callable[[RobotScene], Any]
 """What draws into a scene."""
-
-PATHS = ("visualizer", "cables", "studio", WORKSPACE)
-"""What is taken out of a scene before a run's robot is put there."""
-
-
-class RunScene:
-    """The robot of a run in a Meshcat; all of it belongs to the thread that made that.
-
-    Attributes:
-        robot: The robot.
-    """
-
-    def __init__(self, meshcat: Meshcat, scenario: Scenario | TensionScenario) -> None:
-        """Puts the robot of a scenario and all that is round it into a scene."""
-        for path in PATHS:
-            meshcat.Delete(path)
-        robot = self.robot = load_robot(scenario.robot)
-        servo, cables, world = None, None, None
-        if isinstance(scenario, Scenario):
-            servo = scenario
-        else:
-            cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
-            world = scenario.world
-        self._picture = RobotPicture(
-            robot, robot.tension_limits()[1], servo, cables, meshcat=meshcat, world=world,
-            colors=[nth_look(k).color for k in range(len(robot.cables))],
-        )  # fmt: skip
-        look_at_robot(meshcat, robot)
-
-    def draw(self, sample: Mapping[str, Any]) -> None:
-        """Draws a sample of the run."""
-        pose, tensions = (np.array(sample[name], float) for name in ("pose", "tensions"))
-        unstrained = sample["unstrained"]  # of unknown numbers None becomes NaN
-        self._picture.draw(
-            pose_from_row(pose), tensions, float(sample["t"]),
-            None if unstrained is None else np.array(unstrained, float),
-        )  # fmt: skip

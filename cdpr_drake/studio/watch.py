@@ -21,7 +21,7 @@ from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.plots import MovingPlots, plot_row
 from cdpr_drake.studio.runs import NO_RUN, FinishedRun, RunBoard, RunEntry, RunJob, Sample, read_run
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.side_by_side import Pair
+from cdpr_drake.studio.side_by_side import Pair, pairs
 from cdpr_drake.studio.views import leaves, show_results
 
 SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
@@ -315,14 +315,14 @@ class RunWatch:
 
 def run_pairs(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Pair]:
     """Numbers and words of two summaries of runs that at least one of them has."""
-    sides = []
-    for summary in (one, other):
+
+    def side(summary: Mapping[str, Any]) -> dict[str, Any]:
         own = {key: value for key, value in summary.items() if key not in OF_THE_PROGRAM}
-        sides.append({
+        return {
             name: float(value) if isinstance(value, int) else value for name, value in leaves(own)
-        })  # fmt: skip
-    pairs = [Pair(name, *(side.get(name) for side in sides)) for name in sides[0] | sides[1]]
-    return [pair for pair in pairs if pair.one is not None or pair.other is not None]
+        }
+
+    return pairs(side(one), side(other))
 
 
 def _identity(entry: RunEntry | None) -> tuple[Path, RunJob | None] | None:
