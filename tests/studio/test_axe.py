@@ -8,7 +8,7 @@ from tests.studio import axe
 from tests.studio.pictures import look
 from tests.studio.run_page import press
 
-TITLES = ("Robot", "Pose", "Workspace", "Run", "Logs", "Studies")
+TITLES = ("Robot", "Pose", "Workspace", "Run", "Logs", "Studies", "Commands")
 
 SHOWS = """(() => {
     const panels = [...document.querySelectorAll('.q-tab-panel')];
@@ -142,4 +142,6 @@ def test_axe_sees_what_is_wrong(page):
     turn_to(page, "Robot")
     page.execute_script(FAULTS)
     rules = {line.partition(":")[0] for line in axe.grave(page)}
+    page.refresh()  # which others use
+    wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
     assert {"button-name", "color-contrast"} <= rules

@@ -23,7 +23,7 @@ from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.watch import run_pairs
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.studio.conftest import RUN_SETTINGS
-from tests.studio.pages import field, shown, simulated, until
+from tests.studio.pages import field, problems, shown, simulated, type_into, until
 from tests.studio.run_page import write_scenario
 
 LONGEST = 1200.0
@@ -139,13 +139,13 @@ async def test_a_wrong_value_starts_nothing_and_a_run_fails_or_is_found_again(
     fails = "import sys; print('cdpr: no space left on device', file=sys.stderr); sys.exit(2)"
     monkeypatch.setattr(RunJob, "program", (sys.executable, "-c", fails))
     duration = field(user, "field-duration")
-    duration.value = "-3"
+    type_into(user, "field-duration", "-3")
     await until(lambda: duration.props.get("error"))
-    assert "found -3; accepted: a number > 0 [s]" in duration.props["error-message"]
+    assert "duration: found -3; accepted: a number > 0 [s]" in problems(user)
     await press(user, "start")
     await asyncio.sleep(0.3)
     assert bench.jobs.jobs == []
-    duration.value = "0.2"
+    type_into(user, "field-duration", "0.2")
     await until(lambda: not duration.props.get("error"))
     await press(user, "start")
     await until(lambda: says(user, "run-problem", "no space left on device"))

@@ -57,11 +57,11 @@ def test_the_page_has_the_panel_that_is_shown_and_no_other(studio):
         page = answer.read().decode()
     assert "exit point" in page
     waiting = [panel.title for panel in PANELS.values() if f"{panel.title}: loading" in page]
-    assert waiting == ["Pose", "Workspace", "Run", "Logs", "Studies"]
+    assert waiting == ["Pose", "Workspace", "Run", "Logs", "Studies", "Commands"]
 
 
 async def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(tmp_path, monkeypatch):
-    broken = Panel("Pose", "open_with", "panels.no_such:none", {})
+    broken = Panel("Pose", "open_with", "no_such:none")
     monkeypatch.setitem(PANELS, "pose", broken)
     async with opened_page(tmp_path) as (user, _, _):
         with user:
