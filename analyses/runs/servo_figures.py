@@ -40,7 +40,7 @@ from cdpr_drake.palette import (
     TARGET,
 )
 from cdpr_drake.servoing.circle_features import ELLIPSE_SIZE
-from cdpr_drake.systems.diagrams.camera import add_sensor, pictured_robot
+from cdpr_drake.systems.diagrams.camera import add_pictured_robot, add_sensor
 from cdpr_drake.vision.mark_reading import found_marks
 
 FILM = "camera.mp4"
@@ -230,7 +230,7 @@ def write_film(run: Any, path: Path) -> None:
     """
     built, log, pinhole, target = run.built, run.log, run.built.pinhole, run.built.target
     builder = DiagramBuilder()
-    block = builder.AddNamedSystem("robot", pictured_robot(run.robot, run.scenario))
+    block = add_pictured_robot(builder, run.robot, run.scenario)
     add_renderer(block.scene_graph)
     sensor = add_sensor(builder, block, built.mounting, pinhole)
     diagram = builder.Build()

@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from cdpr_drake.analyses.frame.figures import new_figure
 from cdpr_drake.analyses.studies.study import Case, Form, Frame, Study, summary
@@ -30,8 +31,7 @@ from cdpr_drake.models.rendered_camera import add_renderer
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.systems.cameras.cable_picture_camera import CablePicture
-from cdpr_drake.systems.diagrams.camera import pictured_robot
-from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.diagrams.camera import PicturedRobot, add_pictured_robot
 from cdpr_drake.vision.cable_detection import (
     SLACK,
     TAUT,
@@ -72,10 +72,10 @@ STREAM = 409
 
 
 @lru_cache(maxsize=1)
-def pictured() -> tuple[CableRobot, CablePicture]:
-    """The robot that is drawn, and how."""
-    robot = load_robot(ROBOT)
-    block = pictured_robot(robot)
+def pictured() -> tuple[Diagram, PicturedRobot, CablePicture]:
+    """The robot that is drawn, in its diagram, and how."""
+    robot, builder = load_robot(ROBOT), DiagramBuilder()
+    block = add_pictured_robot(builder, robot)
     add_renderer(block.scene_graph)
     mount = robot.camera_mount(MOUNT)
     camera = load_camera(mount.model)
@@ -88,12 +88,12 @@ def pictured() -> tuple[CableRobot, CablePicture]:
         pinhole=camera.pinhole(camera.width, camera.height),
         grain=GRAIN,
     )
-    return block, picture
+    return builder.Build(), block, picture
 
 
 def drawn_pose(seed: int) -> tuple[RigidTransform, Array]:
     """Pose [m] of a seed and lengths of its cables beyond their ways, shape (m,) [m]."""
-    random, cables = np.random.default_rng([seed, STREAM]), pictured()[1].cables
+    random, cables = np.random.default_rng([seed, STREAM]), pictured()[2].cables
     X_WP = pose_from_angles(
         random.uniform(LOWER, UPPER), np.radians(random.uniform(-TILT, TILT, 3))
     )
@@ -114,11 +114,13 @@ def true_sags(cables: CableSet, X_WP: RigidTransform, surplus: Array) -> Array:
 
 def detected(seed: int, knowledge: str) -> tuple[np.ndarray, SeenSags, Array]:
     """The image of a seed's pose, what is detected in it, and true sags, shape (m,) [m]."""
-    block, picture = pictured()
+    diagram, block, picture = pictured()
     X_WP, surplus = drawn_pose(seed)
-    context = block.CreateDefaultContext()
+    context = diagram.CreateDefaultContext()
     block.in_plant.set_pose(block.plant.GetMyMutableContextFromRoot(context), X_WP)
-    query = block.GetOutputPort("query_object").Eval(context)
+    query = block.GetOutputPort("query_object").Eval(
+        block.scene_graph.GetMyContextFromRoot(context)
+    )
     lengths = cable_paths(X_WP, picture.cables).lengths + surplus
     image = picture.draw(query, X_WP, lengths, seed)
     metres, degrees = ERRORS[knowledge]

@@ -45,7 +45,7 @@ from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import CAMERA, PLATFORM, Look, rgb
 from cdpr_drake.servoing.servo_task import CameraMounting
 from cdpr_drake.systems.cameras.turning_camera import turning_camera
-from cdpr_drake.systems.diagrams.camera import pictured_robot
+from cdpr_drake.systems.diagrams.camera import add_pictured_robot
 from cdpr_drake.systems.monitoring.meshcat_cables import CablePictures
 from cdpr_drake.systems.robots.cable_robot import holding_tensions
 from cdpr_drake.systems.robots.settings import CableSettings
@@ -147,7 +147,7 @@ class RobotPicture(RecordedScene):
         """
         self.title = "" if scenario is None else scenario.title
         builder = DiagramBuilder()
-        self._block = builder.AddNamedSystem("robot", pictured_robot(robot, scenario, world))
+        self._block = add_pictured_robot(builder, robot, scenario, world)
         super().__init__(
             meshcat or open_meshcat(), builder, self._block.GetOutputPort("query_object")
         )

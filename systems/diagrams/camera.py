@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pydrake.geometry import FrameId, SceneGraph
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 
 from cdpr_drake.arrays import Array
@@ -21,14 +23,13 @@ from cdpr_drake.systems.cameras.scene_picture import SceneCamera, SpoiledImages
 from cdpr_drake.systems.cameras.scene_target import SceneTarget
 from cdpr_drake.systems.cameras.target_measurement import TargetDetector, TargetMeasurement
 from cdpr_drake.systems.cameras.targets import TargetSettings
-from cdpr_drake.systems.robots.assembly import RobotBlock, SceneAdder
-from cdpr_drake.systems.robots.cable_robot import CableRobot
+from cdpr_drake.systems.robots.assembly import NamedPorts, RobotBlock, SceneAdder, fill_scene
 from cdpr_drake.systems.worlds.adding import WorldInScene
 from cdpr_drake.systems.worlds.settings import WorldSettings
 from cdpr_drake.vision.pinhole import Pinhole
 from cdpr_drake.vision.target import Target
 
-if TYPE_CHECKING:  # a workspace is drawn by `pictured_robot`, and has no servo
+if TYPE_CHECKING:  # a workspace is drawn by `add_pictured_robot`, and has no servo
     from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario, VisualServoSettings
 
 
@@ -54,12 +55,32 @@ def scene_adder(
     return add
 
 
-def pictured_robot(
-    robot: Robot, scenario: Scenario | None = None, world: WorldSettings | None = None
-) -> CableRobot:
-    """A robot with all that is to be seen of a run, to be posed and drawn; nothing touches it.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PicturedRobot(NamedPorts):
+    """A robot in a plant that is posed and drawn; it has no cables, and nothing touches it.
+
+    Attributes:
+        in_plant: Its platform in the plant.
+        plant: The plant.
+        scene_graph: Its scene.
+    """
+
+    in_plant: RobotInPlant
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+
+
+def add_pictured_robot(
+    builder: DiagramBuilder, robot: Robot, scenario: Scenario | None = None,
+    world: WorldSettings | None = None,
+) -> PicturedRobot:  # fmt: skip
+    """Adds a robot with all that is to be seen of a run.
+
+    All of it is Drake's own, unless a target moves: pydrake frees no diagram with a system that is
+    written in Python.
 
     Args:
+        builder: Where plant and scene graph are added.
         robot: The robot.
         scenario: A visual servo, whose target and world are shown; None: there is none.
         world: The world of a scenario of another kind.
@@ -67,7 +88,15 @@ def pictured_robot(
     section = world if scenario is None else scenario.world
     around = None if section is None else WorldInScene(section, robot, contact=False)
     floor = section is None or section.ground is None
-    return CableRobot(robot, add_to_scene=scene_adder(scenario, around), floor=floor)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
+    in_plant = fill_scene(
+        builder, robot, plant, scene_graph, add_to_scene=scene_adder(scenario, around), floor=floor
+    )
+    ports = {
+        "query_object": scene_graph.get_query_output_port(),
+        "body_velocities": plant.get_body_spatial_velocities_output_port(),
+    }
+    return PicturedRobot({}, ports, in_plant=in_plant, plant=plant, scene_graph=scene_graph)
 
 
 def _add_target(
@@ -226,7 +255,7 @@ def projected_camera(
 
 def add_sensor(
     builder: DiagramBuilder,
-    robot: RobotBlock,
+    robot: RobotBlock | PicturedRobot,
     mounting: CameraMounting,
     pinhole: Pinhole,
     spoiled: SpoiledImages | None = None,
@@ -245,7 +274,7 @@ def add_sensor(
     return sensor
 
 
-def _camera_frame(robot: RobotBlock, mounting: CameraMounting) -> FrameId:
+def _camera_frame(robot: RobotBlock | PicturedRobot, mounting: CameraMounting) -> FrameId:
     """Geometry frame of what carries the camera: the platform, or the world."""
     body = robot.plant.world_body() if mounting.is_eye_to_hand() else robot.in_plant.body
     return robot.plant.GetBodyFrameIdOrThrow(body.index())
