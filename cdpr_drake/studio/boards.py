@@ -90,11 +90,11 @@ class VerbJob(Job):
         data, folder = self.result(), self.folder
         assert folder is not None
         with suppress(OSError):  # a full disk, say: the page shows what there is
+            if data is not None and not has_numbers(folder):  # also of `check`, which fails
+                rows = data if isinstance(data, dict) else {self.arguments[0]: data}
+                folder.mkdir(parents=True, exist_ok=True)
+                (folder / RESULTS[0]).write_text(json.dumps(rows, indent=2), encoding="utf-8")
             if self.state == JobState.FINISHED:
-                if data is not None and not has_numbers(folder):
-                    rows = data if isinstance(data, dict) else {self.arguments[0]: data}
-                    folder.mkdir(parents=True, exist_ok=True)
-                    (folder / RESULTS[0]).write_text(json.dumps(rows, indent=2), encoding="utf-8")
                 write_asked(self._asked, (), self._about)
             elif not folder.is_dir():
                 self._asked.unlink(missing_ok=True)
