@@ -81,6 +81,7 @@ class RunPanel:
             self._which = ui.label().classes("studio-soft").mark("run-robot")
             self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
             self._own.props("dense no-caps outline")
+            self._own.visible = False  # until the scenario says of which robot it is
 
     def _place_watch(self) -> None:
         board, watch = self._board, self._watch
