@@ -188,7 +188,7 @@ def refuse_outside(word: str, folder: WorkingFolder) -> None:
         CdprError: See above; names the option.
     """
     option, mark, value = word.partition("=") if word.startswith("--") else ("", "", word)
-    for part in re.split("[=,;]", value):
+    for part in re.split(r"[=,;:\s\[\]{}'\"]+", value):
         try:
             _ = folder.path(part) if part.strip() else None
         except CdprError as problem:

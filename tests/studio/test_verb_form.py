@@ -88,7 +88,8 @@ def test_a_wrong_value_is_refused_at_its_field(every, folder, key, value):
     "line",
     [["simulate", "--set=robot=../../mine.yaml"], ["workspace", f"--robot={ROBOT}", "--out=x"],
      ["workspace", f"--robot={ROBOT}", "--overwrite"], ["workspace", "--kind=a\nb"],
-     ["check", "--", "/etc/passwd"], ["workspace", "--no-such=1"]],
+     ["check", "--", "/etc/passwd"], ["simulate", "--set=world={file: /etc/passwd}"],
+     ["workspace", "--no-such=1"]],
 )  # fmt: skip
 def test_words_that_no_form_makes_are_refused(every, folder, line):
     with pytest.raises(FieldProblem):
