@@ -196,7 +196,8 @@ async def test_buttons_break_and_push_and_the_scenario_keeps_it(
     await user.open("/")
     await until(lambda: str(file) in field(user, "scenario").options)
     field(user, "scenario").value = str(file)
-    await until(lambda: not field(user, "start").enabled)
+    duration = "field-duration"
+    await until(lambda: shown(user, duration) and field(user, duration).value == "0.5")
     field(user, "paused").value = field(user, "by-hand").value = True
     await press(user, "start")
     await until(lambda: shown(user, "break") and field(user, "break").enabled, LONGEST)
