@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -31,6 +31,8 @@ from cdpr_drake.studio.yaml_edit import with_value
 
 if TYPE_CHECKING:  # it takes a second of the start
     from cdpr_drake.studio.scene import Draw, RobotScene
+
+T = TypeVar("T")
 
 USUAL_ROBOT = "acrobot_large"
 
@@ -88,6 +90,7 @@ class Workbench:
         self.calculator = calculator or Calculator()
         self.jobs = JobManager() if jobs is None else jobs
         self._make_commands = commands
+        self._kept: dict[Any, Any] = {}
         where = robot_file(robot).resolve()
         self.files = RobotFiles(folder, where.parent)
         self.robot: Document[Robot] = Document(
@@ -113,6 +116,12 @@ class Workbench:
         self.questions = RobotQuestions(self.robot.value)
         self.go_home()
         self.robot.changed.connect(lambda: self._take(self.robot.value))
+
+    def kept(self, kind: Callable[[Workbench], T]) -> T:
+        """What the session keeps of a kind, made of the workbench at the first call."""
+        if kind not in self._kept:
+            self._kept[kind] = kind(self)
+        return self._kept[kind]
 
     @cached_property
     def commands(self) -> Mapping[str, Verb]:
