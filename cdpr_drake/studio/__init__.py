@@ -7,7 +7,7 @@ the token gets, and tells sessions by it; Drake's Meshcat is relayed to the same
 and `commands` are the panels.
 
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
-  knows no page; what shows it connects to its signals.
+  knows no page; what shows it subscribes to its events.
 * `Document` is a robot or scenario as a text with undo and redo, changed only by what the checks
   accept. `SettingsForm` is its form, made from the declarations of its settings.
 * `Verb` is a command as its verb declares it, `VerbForm` its form. A `VerbPanel` starts verbs and

@@ -143,16 +143,11 @@ class Board(Generic[J]):
     def choices(self) -> dict[str, Entry[J]]:
         """What there is, the newest first: jobs of the server, then folders.
 
-        In an event loop folders are read by another thread, and are those of the last look.
+        Folders are read by another thread, and are those of the last look.
         """
-        try:
-            loop = asyncio.get_running_loop()
-        except RuntimeError:
-            self._look()
-        else:
-            if not self._looks and time.monotonic() - self._looked > LOOK_PERIOD:
-                self._looks = True
-                loop.run_in_executor(None, self._look)
+        if not self._looks and time.monotonic() - self._looked > LOOK_PERIOD:
+            self._looks = True
+            asyncio.get_running_loop().run_in_executor(None, self._look)
         entries: dict[str, Entry[J]] = {}
         for job in reversed(self._jobs.jobs):
             folder = job.folder

@@ -1,4 +1,4 @@
-"""One thread for numbers and scenes, so that the page never waits for them, and signals of changes.
+"""One thread for numbers and scenes, so that the page never waits for them.
 
 Kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat takes calls
 only from the thread that made it. All of that happens in the thread of the `Calculator`, beside the
@@ -27,18 +27,8 @@ class Calculator:
         return self._executor.submit(work)
 
     def run(self, work: Callable[[], T], done: Callable[[Future[T]], Any] | None = None) -> None:
-        """Does some work, and calls `done` with its future in the caller's event loop.
-
-        Without an event loop it waits for the work, and raises what that does.
-        """
-        future = self.submit(work)
-        try:
-            loop = asyncio.get_running_loop()
-        except RuntimeError:
-            future.result()
-            if done is not None:
-                done(future)
-            return
+        """Does some work, and calls `done` with its future in the caller's event loop."""
+        future, loop = self.submit(work), asyncio.get_running_loop()
 
         def post(future: Future[T]) -> None:
             if done is not None and not loop.is_closed() and not future.cancelled():
@@ -79,35 +69,3 @@ class Latest:
     def _answered(self, future: Future[Any]) -> None:
         self._go_on()
         self._tell(future)
-
-
-def later(seconds: float, call: Callable[[], None]) -> asyncio.TimerHandle | None:
-    """Calls something after a time [s]; without an event loop at once."""
-    try:
-        loop = asyncio.get_running_loop()
-    except RuntimeError:
-        call()
-        return None
-    return loop.call_later(seconds, call)
-
-
-class Signal:
-    """Callbacks that are called when something has changed."""
-
-    def __init__(self) -> None:
-        """Without any."""
-        self._listeners: dict[object, Callable[[], None]] = {}
-
-    def connect(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Calls `listener` from now on; what is returned ends that, also when called twice."""
-        key = object()
-        self._listeners[key] = listener
-        return lambda: self._listeners.pop(key, None) and None
-
-    def emit(self) -> None:
-        """Calls all of them, in the order in which they came."""
-        for listener in list(self._listeners.values()):
-            listener()
-
-    def __len__(self) -> int:
-        return len(self._listeners)

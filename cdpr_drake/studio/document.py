@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from cdpr_drake.studio.calculator import Signal
+from nicegui import Event
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ class Document(Generic[T]):
         Raises:
             CdprError: The text is not accepted.
         """
-        self._read, self.changed = read, Signal()
+        self._read, self.changed = read, Event[[]]()
         self.text, self.value, self.path = text, read(text, path), path
         self._states, self._now = [(text, self.value, path)], 0
         self._editing = asyncio.Lock()

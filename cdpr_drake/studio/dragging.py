@@ -14,7 +14,7 @@ from nicegui import events, ui
 from pydantic import BaseModel, FiniteFloat, ValidationError
 
 from cdpr_drake.studio.live_workspace import LiveWorkspace
-from cdpr_drake.studio.panel import notify, on_page, show_errors
+from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.pose_answer import PoseAnswer
 from cdpr_drake.studio.session import Workbench
 
@@ -69,8 +69,8 @@ def busy_sign(bench: Workbench) -> None:
         sign.set_visibility(first or (bench.is_computing and not bench.is_dragged))
 
     refresh()
-    on_page(bench.results.changed, refresh)
-    on_page(bench.answered, refresh)
+    bench.results.changed.subscribe(refresh)
+    bench.answered.subscribe(refresh)
 
 
 def live_workspace_bar(bench: Workbench) -> None:
@@ -96,8 +96,8 @@ def live_workspace_bar(bench: Workbench) -> None:
 
     refresh()
     switch.on_value_change(choose)
-    on_page(bench.live.changed, refresh)
-    on_page(bench.answered, refresh)
+    bench.live.changed.subscribe(refresh)
+    bench.answered.subscribe(refresh)
 
 
 def size_words(live: LiveWorkspace) -> str:

@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from nicegui import Event
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator, Signal
+from cdpr_drake.studio.calculator import Calculator
 
 if TYPE_CHECKING:  # what computes is imported at the first sketch
     from cdpr_drake.studio.scene import RobotScene
@@ -106,7 +106,7 @@ class LiveWorkspace:
         self._calculator, self._scene = calculator, scene
         self.sketch: WorkspaceSketch | None = None
         self.is_fine, self.problem, self.is_wanted = False, "", True
-        self.changed = Signal()
+        self.changed = Event[[]]()
         self._robot: Robot | None = None
         self._drawn: tuple[Robot | None, int, WorkspaceSketch | None, str] = None, COARSE, None, ""
         self._refining: asyncio.Task[None] | None = None
@@ -148,8 +148,7 @@ class LiveWorkspace:
         self.sketch, self.problem, self.is_fine = sketch, problem, poses == FINE
         self.changed.emit()
         if sketch is not None and not self.is_fine:
-            with suppress(RuntimeError):  # who has no event loop asks for it
-                self._refining = asyncio.get_running_loop().create_task(self.refine(REST))
+            self._refining = asyncio.create_task(self.refine(REST))
 
     async def refine(self, rest: float = 0.0) -> None:
         """Draws a finer workspace of the robot after a rest [s], unless it changes meanwhile."""

@@ -18,7 +18,7 @@ from nicegui import events, ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.door import BENCH
-from cdpr_drake.studio.panel import PANELS, on_page, place_remarks, show_errors
+from cdpr_drake.studio.panel import PANELS, place_remarks, show_errors
 from cdpr_drake.studio.session import Workbench
 
 SCENE = "/scene/"
@@ -104,7 +104,7 @@ def _place_state(bench: Workbench) -> None:
         name.props["title"] = bench.file or bench.robot.value.title
 
     refresh()
-    on_page(bench.robot.changed, refresh)
+    bench.robot.changed.subscribe(refresh)
 
 
 def _press(bench: Workbench, event: events.KeyEventArguments) -> None:

@@ -6,16 +6,14 @@ Errors are messages, too: whatever a handler raises, the server stays alive, see
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
-from inspect import iscoroutinefunction
 
-from nicegui import background_tasks, ui
+from nicegui import ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.calculator import Signal
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
 
 WORKSPACES, RUN, COMPARED, LOG, STUDY, ANSWER = (
@@ -99,24 +97,7 @@ def place_remarks(bench: Workbench, panel: Panel) -> None:
                     print_.text = f"{title}: {subject.robot}, {subject.fingerprint}"
 
     refresh()
-    on_page(results.changed, refresh)
-
-
-def on_page(signal: Signal, listener: Callable[[], Awaitable[None] | None]) -> None:
-    """Calls a listener of the page that is being built, until that is closed for good.
-
-    One that waits for something is called soon.
-    """
-    client = ui.context.client
-
-    async def later() -> None:
-        with client:
-            await listener()  # type: ignore[misc]
-
-    def soon() -> None:
-        background_tasks.create(later(), name="listener")
-
-    client.on_delete(signal.connect(soon if iscoroutinefunction(listener) else listener))  # type: ignore[arg-type]
+    results.changed.subscribe(refresh)
 
 
 def robot_argument(bench: Workbench) -> str:

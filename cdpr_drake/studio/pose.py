@@ -16,7 +16,7 @@ from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.palette import SLACK, nth_look
 from cdpr_drake.studio.dragging import busy_sign
 from cdpr_drake.studio.numbers import fact_rows, number_words
-from cdpr_drake.studio.panel import message, on_page, show_errors
+from cdpr_drake.studio.panel import message, show_errors
 from cdpr_drake.studio.pose_answer import PoseAnswer, PoseAxis
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.tensions.methods import METHODS
@@ -71,8 +71,8 @@ def pose_panel(bench: Workbench) -> None:
     method.on_value_change(choose)
     reference.on_value_change(choose)
     home.on_click(go_home)
-    on_page(bench.answered, refresh)
-    on_page(bench.robot.changed, refresh)
+    bench.answered.subscribe(refresh)
+    bench.robot.changed.subscribe(refresh)
 
 
 def _methods(bench: Workbench) -> dict[str, str]:
@@ -97,8 +97,8 @@ def _place_sliders(bench: Workbench) -> None:
             show(value)
 
     follow()
-    on_page(bench.answered, follow)
-    on_page(bench.robot.changed, follow)
+    bench.answered.subscribe(follow)
+    bench.robot.changed.subscribe(follow)
 
 
 def _place_slider(bench: Workbench, k: int, axis: PoseAxis) -> Callable[[float], None]:

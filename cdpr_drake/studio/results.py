@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import hashlib
 import json
@@ -11,11 +12,11 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
+from nicegui import Event
 from pydrake.math import RigidTransform
 
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Signal, later
 
 FINGERPRINT = 8
 """Digits of a digest that are shown; two of a thousand robots share them about once in 10,000."""
@@ -86,7 +87,7 @@ class Results:
 
     def __init__(self, now: Callable[[], Subject]) -> None:
         """Of a workbench; `now` says what is open there."""
-        self._now, self.changed = now, Signal()
+        self._now, self.changed = now, Event[[]]()
         self._subjects: dict[str, Subject | None] = {}
         self._awaited: dict[str, float] = {}  # until when
 
@@ -96,7 +97,7 @@ class Results:
         That holds until it is shown, and at most for so long [s].
         """
         self._awaited[name] = monotonic() + longest
-        later(longest + CLOCK, self.changed.emit)
+        asyncio.get_running_loop().call_later(longest + CLOCK, self.changed.emit)
 
     def show(self, name: str, subject: Subject | None) -> None:
         """Says what the result of a name is about from now on; None: there is none any more."""

@@ -18,7 +18,7 @@ from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
 from cdpr_drake.studio.numbers import pair_table
-from cdpr_drake.studio.panel import notify, on_page, show_errors
+from cdpr_drake.studio.panel import notify, show_errors
 from cdpr_drake.studio.robot_files import (
     LARGEST_UPLOAD,
     MOST_UPLOADS,
@@ -70,7 +70,7 @@ def robot_panel(bench: Workbench) -> None:
     place_beside(bench)
     add_point_dragging(bench)
     refresh()
-    on_page(bench.robot.changed, refresh)
+    bench.robot.changed.subscribe(refresh)
 
 
 async def _act(bench: Workbench, action: Callable[[Workbench], Awaitable[None]]) -> None:
@@ -215,4 +215,4 @@ def place_beside(bench: Workbench) -> None:
 
     fold.on_value_change(unfold).mark("robot-beside")
     other.on_value_change(compare)
-    on_page(bench.robot.changed, compare)
+    bench.robot.changed.subscribe(compare)

@@ -13,7 +13,7 @@ from cdpr_drake.analyses.runs.log import PARTS
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.jobs import Job, JobState
-from cdpr_drake.studio.panel import COMPARED, RUN, on_page, robot_argument, show_errors
+from cdpr_drake.studio.panel import COMPARED, RUN, robot_argument, show_errors
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
@@ -62,7 +62,7 @@ class RunPanel:
         with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
             self._body = ui.element("div")
         ui.timer(0.0, self._begin, once=True)
-        on_page(bench.robot.changed, self._take_robot)  # type: ignore[arg-type]
+        bench.robot.changed.subscribe(self._take_robot)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+from nicegui import Event
 from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
@@ -18,7 +19,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator, Latest, Signal, later
+from cdpr_drake.studio.calculator import Calculator, Latest
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
@@ -105,7 +106,7 @@ class Workbench:
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
         self.problem: BaseException | None = None
-        self.answered = Signal()
+        self.answered = Event[[]]()
         self.is_dragged = False
         self.dark: bool | None = None
         self.results = Results(lambda: self.subject)
@@ -115,7 +116,7 @@ class Workbench:
         self.live = LiveWorkspace(self.calculator, self.scene)
         self.questions = RobotQuestions(self.robot.value)
         self.go_home()
-        self.robot.changed.connect(lambda: self._take(self.robot.value))
+        self.robot.changed.subscribe(lambda: self._take(self.robot.value))
 
     def kept(self, kind: Callable[[Workbench], T]) -> T:
         """What the session keeps of a kind, made of the workbench at the first call."""
@@ -285,10 +286,7 @@ class Workbench:
         self.ask()
 
     def ask(self) -> None:
-        """Asks what there is to know, and draws it; `answered` tells, of several the last.
-
-        Without an event loop it waits for the answer.
-        """
+        """Asks what there is to know, and draws it; `answered` tells, of several the last."""
         if not self.is_computing:
             self.results.wait_for(POSE_NUMBERS, LATE)
         place = self.X_WP, self.method, self.reference
@@ -322,7 +320,7 @@ class Workbench:
         if not self.is_dragged:
             self._tell()
         elif self._telling is None:
-            self._telling = later(TELL, self._tell)
+            self._telling = asyncio.get_running_loop().call_later(TELL, self._tell)
 
     def _tell(self) -> None:
         """Tells what there is to know, of what is dragged less often than it is drawn."""

@@ -20,7 +20,7 @@ from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.document import Document
-from cdpr_drake.studio.panel import message, notify, on_page, show_errors
+from cdpr_drake.studio.panel import message, notify, show_errors
 from cdpr_drake.studio.yaml_edit import Place, flow, value_in, with_item, with_value, without_item
 
 Edit = Callable[[str], str]
@@ -124,7 +124,7 @@ class SettingsForm:
         self._layout, self._path = None, document.path
         self._box = ui.element("div").classes("w-full")
         self.refresh()
-        on_page(document.changed, self.refresh)
+        document.changed.subscribe(self.refresh)
 
     def refresh(self) -> None:
         """Shows the document as it is now."""
@@ -512,7 +512,7 @@ def document_buttons(document: Document[Any], title: str, mark: str = "") -> Non
 
     tool("As text", "notes", show).mark(f"{mark}as-text")
     refresh()
-    on_page(document.changed, refresh)
+    document.changed.subscribe(refresh)
 
 
 def tool(words: str, icon: str, action: Callable[[], object], *, bare: bool = False) -> ui.button:

@@ -10,7 +10,7 @@ import numpy as np
 from nicegui import run, ui
 
 from cdpr_drake.palette import TENSIONS
-from cdpr_drake.studio.panel import WORKSPACES, on_page, show_errors
+from cdpr_drake.studio.panel import WORKSPACES, show_errors
 from cdpr_drake.studio.regions import Layer, Plane, Regions, draw_plane, read_regions, show_regions
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import VerbPanel, VerbTab
@@ -47,7 +47,7 @@ class RegionView:
         self.visible: set[str] = set()
         self.plane: Plane | None = None
         self._in_scene: Regions | None = None
-        bench.results.changed.connect(self._follow)
+        bench.results.changed.subscribe(self._follow, unsubscribe_on_delete=False)
 
     def _fitting(self) -> Regions | None:
         """The regions, if the scene shows the robot that they are of."""
@@ -125,7 +125,7 @@ def workspace_panel(bench: Workbench) -> None:
 
     VerbPanel(bench, TAB, show=show)
     say_hidden()
-    on_page(bench.results.changed, say_hidden)
+    bench.results.changed.subscribe(say_hidden)
 
 
 def _place_layers(regions: Regions, shown: RegionView) -> None:

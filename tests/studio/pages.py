@@ -94,6 +94,11 @@ def _loading(user):
         return bool(list(ElementFilter(marker="panel-loading")))
 
 
+async def settled(bench):
+    """Waits until what was asked last is answered and told."""
+    await until(lambda: not bench.is_computing and bench._telling is None)
+
+
 async def until(condition, seconds=300.0):
     """Waits until something holds; kernels may have to be compiled first."""
     for _ in range(int(seconds / 0.02)):

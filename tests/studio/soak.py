@@ -111,27 +111,24 @@ async def _write_rows() -> None:
 
 def held() -> dict[str, float]:
     """What this process holds."""
-    from nicegui import Client
+    from nicegui import Client, Event
     from nicegui.element import Element
 
-    from cdpr_drake.studio.calculator import Signal
     from cdpr_drake.studio.session import Workbench
 
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     kinds: Counter[type] = Counter()
-    listeners = 0
     objects = gc.get_objects()
     for thing in objects:
-        for kind in (Workbench, Client, Element, Signal):
+        for kind in (Workbench, Client, Element):
             if issubclass(type(thing), kind):
                 kinds[kind] += 1
-                listeners += len(thing) if kind is Signal else 0
     return {
         "rss_mb": round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1),
         "tasks": len(asyncio.all_tasks()), "threads": threading.active_count(),
         "files": len(os.listdir("/proc/self/fd")), "objects": len(objects),
         "sessions": kinds[Workbench], "clients": kinds[Client], "elements": kinds[Element],
-        "listeners": listeners,
+        "listeners": sum(len(event.callbacks) for event in Event.instances),
     }  # fmt: skip
 
 

@@ -1,6 +1,5 @@
 """The static workspace that follows a robot while it is changed, and points that are dragged."""
 
-import asyncio
 import json
 import threading
 
@@ -16,7 +15,7 @@ from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.live_workspace import COARSE, FINE, sketch_grid, sketch_workspace
 from cdpr_drake.studio.scene import SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
-from tests.studio.pages import field, type_into, until
+from tests.studio.pages import field, settled, type_into, until
 
 ROBOT = "acrobot_large"
 
@@ -35,23 +34,23 @@ def calculator():
 
 
 @pytest.fixture
-def alone(tmp_path, calculator):
-    """A workbench without a page."""
-    made = Workbench(WorkingFolder(tmp_path), calculator=calculator)
-    made.ask()
-    return made
+def alone(tmp_path, calculator, monkeypatch):
+    """A workbench without a page, whose workspace is refined when it is asked for."""
+    monkeypatch.setattr(live_workspace, "REST", 1e6)
+    return Workbench(WorkingFolder(tmp_path), calculator=calculator)
 
 
 def in_scene(bench, path=WORKSPACE):
     return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result()
 
 
-def drag(bench, p_W, done=False):
-    return bench.drag_point("exit", 0, p_W, done=done)
+async def drag(bench, p_W, done=False):
+    bench.drag_point("exit", 0, p_W, done=done)
+    await settled(bench)
 
 
-def test_a_sketch_is_what_the_command_computes(alone, tmp_path, capsys):
-    drag(alone, THERE, done=True)
+async def test_a_sketch_is_what_the_command_computes(alone, tmp_path, capsys):
+    await drag(alone, THERE, done=True)
     alone.save("moved.yaml", overwrite=False)
     sketch = alone.live.sketch
     grid = ",".join(str(count) for count in sketch.counts)
@@ -72,45 +71,48 @@ def test_grids_have_about_the_poses_that_are_wanted(name, poses):
     assert np.ptp(steps) < 0.2 * np.max(steps)
 
 
-def test_it_is_drawn_when_a_point_moves_and_not_before(alone):
+async def test_it_is_drawn_when_a_point_moves_and_not_before(alone):
     assert not in_scene(alone)
-    drag(alone, THERE)
+    await drag(alone, THERE)
     assert in_scene(alone)
     coarse = alone.live.sketch
     assert not alone.live.is_fine
-    drag(alone, FARTHER)
+    await drag(alone, FARTHER)
     assert alone.live.sketch.volume != coarse.volume
-    asyncio.run(alone.live.refine())
+    await alone.live.refine()
     assert alone.live.is_fine
     assert np.prod(alone.live.sketch.counts) > 10 * np.prod(coarse.counts)
     alone.move_to(alone.coordinates)
+    await settled(alone)
     assert alone.live.is_fine  # no robot has changed
-    drag(alone, THERE)
+    await drag(alone, THERE)
     assert not alone.live.is_fine
     assert alone.live.sketch.volume == coarse.volume
     alone.live.want(False)
-    drag(alone, FARTHER)
+    await drag(alone, FARTHER)
     assert not in_scene(alone)
     assert in_scene(alone, SHADER)  # which stays compiled
     alone.live.want(True)
     assert in_scene(alone)
 
 
-def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(alone):
-    drag(alone, THERE, done=True)
+async def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(alone):
+    await drag(alone, THERE, done=True)
     assert alone.live.sketch.volume == sketch_workspace(alone.robot.value, COARSE).volume
     alone.calculator.submit(lambda: alone.scene().meshcat.Delete(WORKSPACE)).result()
     alone.draw(lambda scene: scene.redraw())  # as after others have drawn into the scene
     alone.ask()
+    await settled(alone)
     assert in_scene(alone)
     alone.open("acrobot_small")
+    await settled(alone)
     assert not in_scene(alone)
     assert alone.live.sketch is None
 
 
-def test_a_robot_without_a_static_workspace_says_why(alone):
+async def test_a_robot_without_a_static_workspace_says_why(alone):
     alone.open("grab_four")
-    drag(alone, alone.robot.value.cable_set().p_WA[:, 0] + 0.01)
+    await drag(alone, alone.robot.value.cable_set().p_WA[:, 0] + 0.01)
     assert "degrees of freedom" in alone.live.problem
     assert not in_scene(alone)
 
@@ -126,7 +128,7 @@ async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, 
     monkeypatch.setattr(live_workspace, "REST", 0.05)
     places = np.linspace(-0.45, -0.3, 31)
     for x in places:
-        drag(bench, np.array([x, -0.5, 1.1]))
+        bench.drag_point("exit", 0, np.array([x, -0.5, 1.1]), done=False)
     await until(lambda: bench.live.is_fine)
     coarse = [x for poses, x in computed if poses == COARSE]
     assert len(coarse) < 4
@@ -141,7 +143,7 @@ async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, 
     await until(lambda: "refined" in field(user, "live-size").text)
 
 
-def test_the_scene_comes_before_the_page(alone, monkeypatch):
+async def test_the_scene_comes_before_the_page(alone, monkeypatch):
     order, show_workspace = [], RobotScene.show_workspace
 
     def shown(scene, solid):
@@ -149,9 +151,9 @@ def test_the_scene_comes_before_the_page(alone, monkeypatch):
         order.append("scene")
 
     monkeypatch.setattr(RobotScene, "show_workspace", shown)
-    alone.answered.connect(lambda: order.append("numbers"))
-    alone.live.changed.connect(lambda: order.append("size"))
-    drag(alone, THERE)
+    alone.answered.subscribe(lambda: order.append("numbers"))
+    alone.live.changed.subscribe(lambda: order.append("size"))
+    await drag(alone, THERE)
     assert order == ["scene", "size", "numbers"]
 
 
@@ -161,13 +163,13 @@ async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are
 ):
     monkeypatch.setattr(sessions, "LATE", late)
     bench, said, held_up = held.bench, [], threading.Event()
-    bench.results.changed.connect(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
+    bench.results.changed.subscribe(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
     bench.calculator.submit(held_up.wait)  # as while a kernel is compiled
     before = bench.answer
     with user:
         signs = list(ElementFilter(marker="busy"))
     try:
-        drag(bench, p_W)
+        bench.drag_point("exit", 0, p_W, done=False)
         assert not any(sign.visible for sign in signs)  # it would flicker in the hand
         bench.move_to(bench.coordinates)
         assert [sign.visible for sign in signs] == [True, True]

@@ -17,6 +17,7 @@ from cdpr_drake.studio.scene import EXITS, R_EW, look_at_robot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.yaml_edit import with_value
 from tests.models.formats.foreign_files import caspr
+from tests.studio.pages import settled
 
 ROUNDING = 1e-9
 """Of coordinates, there and back [m, deg]."""
@@ -67,10 +68,11 @@ def test_changes_are_undone_and_done_again_and_wrong_ones_change_nothing(bench):
     ]
 
 
-def test_the_numbers_are_those_of_the_commands(bench, tmp_path, capsys):
+async def test_the_numbers_are_those_of_the_commands(bench, tmp_path, capsys):
     move(bench, -0.37)
     bench.save("mine.yaml", overwrite=False)
     bench.move_to([0.1, -0.05, 0.3, 5.0, -3.0, 10.0])
+    await settled(bench)
     answers = {}
     for command in ("tension", "static"):
         with pytest.raises(SystemExit):
@@ -130,23 +132,27 @@ def test_the_scene_shows_all_of_a_robot_whatever_its_size(name):
     assert np.min(apart + 10.0 * np.eye(len(exits))) > APART
 
 
-def test_the_scene_follows_the_robot(bench):
+async def test_the_scene_follows_the_robot(bench):
     def has(path):
         return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result()
 
     bench.ask()
+    await settled(bench)
     assert has(f"{EXITS}/7")
     bench.open("planar")
+    await settled(bench)
     assert has(f"{EXITS}/2")
     assert not has(f"{EXITS}/7")
 
 
-def test_points_are_dragged(bench):
+async def test_points_are_dragged(bench):
     start = bench.robot.text
     bench.ask()
+    await settled(bench)
     before = bench.answer.tensions.copy()
     assert bench.drag_point("exit", 0, np.array([-0.4, -0.5, 1.1]), done=False) == ""
     assert bench.robot.text == start
+    await settled(bench)
     assert not np.allclose(bench.answer.tensions, before)
     assert bench.drag_point("exit", 0, np.array([-0.37, -0.525, 1.165]), done=True) == ""
     assert bench.robot.value.cables[0].exit_point.tolist() == [-0.37, -0.525, 1.165]
@@ -154,6 +160,7 @@ def test_points_are_dragged(bench):
     words = bench.drag_point("exit", 0, np.array([1e6, 0.0, 0.0]), done=True)
     assert "found 1000000.0; accepted: 3 numbers" in words
     assert bench.robot.text == start
+    await settled(bench)
     np.testing.assert_array_equal(bench.answer.tensions, before)
 
 
