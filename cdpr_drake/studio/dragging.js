@@ -4,7 +4,7 @@
 (() => {
   if (window.studioDragging) return;
   window.studioDragging = true;
-  const NEAR = 14, SAME = 2, PERIOD = 50, SLOW = 40, COARSE = 0.5, FORGIVEN = 0.02, BURST = 8;
+  const NEAR = 14, SAME = 2, PERIOD = 50, SLOW = 40, COARSE = 0.4, FORGIVEN = 0.02, BURST = 8;
   const times = (M, v) => [0, 1, 2, 3].map(
     (i) => M[i] * v[0] + M[i + 4] * v[1] + M[i + 8] * v[2] + M[i + 12] * v[3]);
   const frame = () => document.getElementById('scene');
