@@ -39,33 +39,3 @@ class Calculator:
     def close(self) -> None:
         """Ends the thread, once the work under way is done."""
         self._executor.shutdown(wait=True, cancel_futures=True)
-
-
-class Latest:
-    """Of questions that come faster than answers, the newest; those before it are dropped.
-
-    Attributes:
-        is_busy: True from a question to the answer of the newest one.
-    """
-
-    def __init__(self, calculator: Calculator, tell: Callable[[Future[Any]], None]) -> None:
-        """Asks a calculator; `tell` gets each answer in the event loop of who asked."""
-        self._calculator, self._tell = calculator, tell
-        self._question: Callable[[], Any] | None = None
-        self.is_busy = False
-
-    def ask(self, question: Callable[[], Any]) -> None:
-        """Asks at once, or after the question that is being answered."""
-        self._question = question
-        if not self.is_busy:
-            self._go_on()
-
-    def _go_on(self) -> None:
-        question, self._question = self._question, None
-        self.is_busy = question is not None
-        if question is not None:
-            self._calculator.run(question, self._answered)
-
-    def _answered(self, future: Future[Any]) -> None:
-        self._go_on()
-        self._tell(future)

@@ -6,15 +6,16 @@ that is one change of the document.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from importlib.resources import files
 from typing import Literal
 
 import numpy as np
 from nicegui import events, ui
-from pydantic import BaseModel, FiniteFloat, ValidationError
+from pydantic import BaseModel, FiniteFloat, NonNegativeInt, ValidationError
 
-from cdpr_drake.studio.live_workspace import LiveWorkspace
-from cdpr_drake.studio.panel import notify, show_errors
+from cdpr_drake.studio.live_workspace import FINE, LiveWorkspace
+from cdpr_drake.studio.panel import notify
 from cdpr_drake.studio.pose_answer import PoseAnswer
 from cdpr_drake.studio.session import Workbench
 
@@ -34,7 +35,7 @@ class _Moved(BaseModel):
     """What the script says: which point, its number, p_W [m], and whether it was let go."""
 
     kind: Literal["exit", "anchor"]
-    number: int
+    number: NonNegativeInt
     at: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
     done: bool = False
 
@@ -43,12 +44,9 @@ def add_point_dragging(bench: Workbench) -> None:
     """Lets the points in the page's scene be dragged."""
 
     def moved(event: events.GenericEventArguments) -> None:
-        with show_errors():
-            try:
-                point = _Moved.model_validate(event.args)
-            except ValidationError:
-                return  # the script says no such thing
-            if 0 <= point.number < len(bench.robot.value.cables):
+        with suppress(ValidationError):  # the script says no such thing
+            point = _Moved.model_validate(event.args)
+            if point.number < len(bench.robot.value.cables):
                 words = bench.drag_point(point.kind, point.number, np.array(point.at), point.done)
                 if words:
                     notify(words)
@@ -84,8 +82,7 @@ def live_workspace_bar(bench: Workbench) -> None:
 
     def choose() -> None:
         if switch.value != bench.live.is_wanted:
-            with show_errors():
-                bench.live.want(bool(switch.value))
+            bench.live.want(bool(switch.value))
             refresh()
 
     def refresh() -> None:
@@ -102,14 +99,15 @@ def live_workspace_bar(bench: Workbench) -> None:
 
 def size_words(live: LiveWorkspace) -> str:
     """How large the workspace is, or why there is none to see."""
+    sketch = live.sketch
     if not live.is_wanted:
         return HIDDEN
-    if live.problem:
-        return f"static workspace: {live.problem}"
-    if live.sketch is None:
+    if sketch is None:
         return EMPTY
-    volume, grid = live.sketch.volume, " x ".join(str(count) for count in live.sketch.counts)
-    how = "refined" if live.is_fine else "coarse"
+    if sketch.volume is None:
+        return f"static workspace: {sketch.problem}"
+    volume, grid = sketch.volume, " x ".join(str(count) for count in sketch.counts)
+    how = "coarse" if sketch.poses < FINE else "refined"
     return (
         f"static workspace: {100.0 * volume.share:.1f} % of the grid's box, {volume.value:.4g} "
         f"{volume.unit} ({how}, {grid} poses, level platform)"

@@ -42,23 +42,25 @@ class WorkspaceSketch:
     """A static workspace on a grid.
 
     Attributes:
+        robot: Whose it is.
+        poses: About so many were wanted.
+        problem: Why the robot has none; empty: it has.
         counts: Points of the grid along x, y, z.
-        volume: Of the cells whose corners are all inside.
+        volume: Of the cells whose corners are all inside; None: the robot has none.
         solid: Vertices, shape (n, 3) [m], and triangles, shape (k, 3); None: it is empty, or the
             robot moves along a line.
     """
 
-    counts: tuple[int, int, int]
-    volume: WorkspaceVolume
-    solid: tuple[Array, np.ndarray] | None
+    robot: Robot
+    poses: int
+    problem: str = ""
+    counts: tuple[int, int, int] = (0, 0, 0)
+    volume: WorkspaceVolume | None = None
+    solid: tuple[Array, np.ndarray] | None = None
 
 
 def sketch_workspace(robot: Robot, poses: int) -> WorkspaceSketch:
-    """The static workspace of a robot on a grid of about so many poses.
-
-    Raises:
-        CdprError: The robot has no static workspace.
-    """
+    """The static workspace of a robot on a grid of about so many poses."""
     from cdpr_drake.analyses.workspaces.robot_conditions import static_case
     from cdpr_drake.workspaces.static_feasibility import statically_feasible
     from cdpr_drake.workspaces.volume import (
@@ -68,13 +70,16 @@ def sketch_workspace(robot: Robot, poses: int) -> WorkspaceSketch:
         workspace_volume,
     )
 
-    case, grid = static_case(robot), sketch_grid(robot, poses)
-    places = statically_feasible(case, grid.positions(), grid.rotations()).reshape(grid.shape[1:])
+    try:
+        case, grid = static_case(robot), sketch_grid(robot, poses)
+        places = statically_feasible(case, grid.positions(), grid.rotations())
+    except CdprError as refusal:
+        return WorkspaceSketch(robot, poses, str(refusal))
+    places = places.reshape(grid.shape[1:])
     vertices, faces = triangles(surface_quads(places, grid.axes))
-    return WorkspaceSketch(
-        grid.shape[1:], workspace_volume(places, grid.axes, VolumeRule.CORNERS),
-        (vertices, faces) if len(faces) else None,
-    )  # fmt: skip
+    volume = workspace_volume(places, grid.axes, VolumeRule.CORNERS)
+    solid = (vertices, faces) if len(faces) else None
+    return WorkspaceSketch(robot, poses, "", grid.shape[1:], volume, solid)
 
 
 def sketch_grid(robot: Robot, poses: int) -> WorkspaceGrid:
@@ -95,8 +100,6 @@ class LiveWorkspace:
 
     Attributes:
         sketch: The workspace as it is drawn; None: there is none.
-        is_fine: True if it has been refined.
-        problem: Why the robot has none; empty: it has, or nobody asked.
         is_wanted: True if it is computed and drawn.
         changed: Called when any of these has changed.
     """
@@ -105,16 +108,15 @@ class LiveWorkspace:
         """With the calculator and the scene, which is asked for in its thread only."""
         self._calculator, self._scene = calculator, scene
         self.sketch: WorkspaceSketch | None = None
-        self.is_fine, self.problem, self.is_wanted = False, "", True
-        self.changed = Event[[]]()
+        self.is_wanted, self.changed = True, Event[[]]()
         self._robot: Robot | None = None
-        self._drawn: tuple[Robot | None, int, WorkspaceSketch | None, str] = None, COARSE, None, ""
-        self._refining: asyncio.Task[None] | None = None
+        self._drawn: WorkspaceSketch | None = None
+        self._refining: asyncio.TimerHandle | None = None
 
     def want(self, wanted: bool) -> None:
         """Computes and draws it from now on, or takes it out of the scene."""
         self.is_wanted = wanted
-        self._calculator.run(self.draw, lambda _: self.take())
+        self._redraw(COARSE)
 
     def follow(self, robot: Robot | None) -> None:
         """Is about a robot from now on, at the next `draw`; None: about none."""
@@ -124,34 +126,26 @@ class LiveWorkspace:
 
     def compute(self, poses: int = COARSE) -> None:
         """Computes the workspace of the newest robot, unless it is there; see `draw`."""
-        robot = self._robot if self.is_wanted else None
-        if robot is self._drawn[0] and poses <= self._drawn[1]:
-            return
-        sketch, problem = None, ""
-        try:
-            sketch = None if robot is None else sketch_workspace(robot, poses)
-        except CdprError as refusal:
-            problem = str(refusal)
-        self._drawn = robot, poses, sketch, problem
+        robot, drawn = self._robot if self.is_wanted else None, self._drawn
+        if robot is None:
+            self._drawn = None
+        elif drawn is None or drawn.robot is not robot or drawn.poses < poses:
+            self._drawn = sketch_workspace(robot, poses)
 
     def draw(self, poses: int = COARSE) -> None:
         """Draws it on a grid of about so many poses, or more; in the calculator's thread."""
         self.compute(poses)
-        sketch = self._drawn[2]
-        self._scene().show_workspace(None if sketch is None else sketch.solid)
+        self._scene().show_workspace(None if self._drawn is None else self._drawn.solid)
 
     def take(self) -> None:
         """Tells what was drawn, and refines it after a rest; in the thread of the page."""
-        _, poses, sketch, problem = self._drawn
-        if (sketch, problem) == (self.sketch, self.problem):
-            return
-        self.sketch, self.problem, self.is_fine = sketch, problem, poses == FINE
-        self.changed.emit()
-        if sketch is not None and not self.is_fine:
-            self._refining = asyncio.create_task(self.refine(REST))
+        sketch = self._drawn
+        if sketch is not self.sketch:
+            self.sketch = sketch
+            self.changed.emit()
+            if sketch is not None and not sketch.problem and sketch.poses < FINE:
+                loop = asyncio.get_running_loop()
+                self._refining = loop.call_later(REST, self._redraw, FINE)
 
-    async def refine(self, rest: float = 0.0) -> None:
-        """Draws a finer workspace of the robot after a rest [s], unless it changes meanwhile."""
-        await asyncio.sleep(rest)
-        await asyncio.wrap_future(self._calculator.submit(lambda: self.draw(FINE)))
-        self.take()
+    def _redraw(self, poses: int) -> None:
+        self._calculator.run(lambda: self.draw(poses), lambda _: self.take())

@@ -18,7 +18,7 @@ from nicegui import events, ui
 
 from cdpr_drake.palette import COLORS, SLACK
 from cdpr_drake.studio.door import BENCH
-from cdpr_drake.studio.panel import PANELS, place_remarks, show_errors
+from cdpr_drake.studio.panel import PANELS, place_remarks, say_errors, show_errors
 from cdpr_drake.studio.session import Workbench
 
 SCENE = "/scene/"
@@ -44,6 +44,7 @@ def make_page(
 
     def page() -> None:
         ui.add_css(STYLE)
+        say_errors()
         bench = bench_of(ui.context.client.request)
         ui.keyboard(lambda event: _press(bench, event), ignore=["input", "textarea"])
         with ui.header().classes("studio-header"):
@@ -110,14 +111,10 @@ def _place_state(bench: Workbench) -> None:
 def _press(bench: Workbench, event: events.KeyEventArguments) -> None:
     """Ctrl-Z, Ctrl-Y and Ctrl-Shift-Z in every tab, but in fields, which have their own."""
     key = str(event.key).lower()
-    if (
-        event.action.keydown
-        and (event.modifiers.ctrl or event.modifiers.meta)
-        and key in ("y", "z")
-    ):
+    is_control = event.modifiers.ctrl or event.modifiers.meta
+    if event.action.keydown and is_control and key in ("y", "z"):
         is_undo = key == "z" and not event.modifiers.shift
-        with show_errors():
-            (bench.robot.undo if is_undo else bench.robot.redo)()
+        (bench.robot.undo if is_undo else bench.robot.redo)()
 
 
 def _place_panels(bench: Workbench, tabs: ui.tabs) -> None:
@@ -145,7 +142,7 @@ def _place_panels(bench: Workbench, tabs: ui.tabs) -> None:
     async def place_rest() -> None:
         if waiting:  # not a browser that comes back
             future = bench.calculator.submit(load)
-            bench.scene_address()
+            _ = bench.scene_address  # the robot is drawn there before anything is known of it
             bench.ask()
             await asyncio.wrap_future(future)
             loaded.set()

@@ -1,6 +1,7 @@
 """The table of panels, how one connects to a workbench, and messages in the page.
 
-Errors are messages, too: whatever a handler raises, the server stays alive, see `show_errors`.
+Errors are messages, too: whatever a handler raises, the page says it, see `say_errors`. Mistakes of
+this program are logged as well, with their traceback.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 
-from nicegui import ui
+from nicegui import app, ui
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
@@ -24,8 +25,6 @@ model, a study, what a command answered."""
 
 LONGEST = 490
 """Characters of a message; longer ones lose their middle."""
-
-_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -72,29 +71,26 @@ PANELS = {
 
 def place_remarks(bench: Workbench, panel: Panel) -> None:
     """Places what is to be said about the results of a panel: of which robot they are."""
-    results = bench.results
-    rows = {name: (ui.label().mark(f"about-{name}"), ui.label().mark(f"fingerprint-{name}"))
-            for name in panel.results}  # fmt: skip
-    for name, (differs, print_) in rows.items():
-        # Numbers at the pose change with each step of a slider: their row is always there.
-        differs.classes(f"studio-stale {'studio-kept' if name == POSE_NUMBERS else ''}")
-        differs.props('role="status"')
-        print_.classes("studio-fingerprint")
+    for name, title in panel.results.items():
+        _place_remark(bench, name, title)
+
+
+def _place_remark(bench: Workbench, name: str, title: str) -> None:
+    results, is_pose = bench.results, name == POSE_NUMBERS
+    differs = ui.label().classes("studio-stale").props('role="status"').mark(f"about-{name}")
+    print_ = ui.label().classes("studio-fingerprint").mark(f"fingerprint-{name}")
+    if is_pose:  # which change with each step of a slider: their row is always there
+        differs.classes("studio-kept")
 
     def refresh() -> None:
-        for name, (differs, print_) in rows.items():
-            title, words, subject = (
-                panel.results[name],
-                results.differs(name),
-                results.subject(name),
-            )
-            differs.text = f"{title}: {words}." if words else ""
-            print_.text = ""
-            if subject is not None:  # robots of its own are nothing to be warned of
-                soft = "" if subject.robot else "studio-soft"
-                differs.classes(add=soft, remove="" if soft else "studio-soft")
-                if subject.digest and name != POSE_NUMBERS:
-                    print_.text = f"{title}: {subject.robot}, {subject.fingerprint}"
+        words, subject = results.differs(name), results.subject(name)
+        differs.text = f"{title}: {words}." if words else ""
+        print_.text = ""
+        differs.classes(remove="studio-soft")
+        if subject is not None and not subject.robot:  # nothing to be warned of
+            differs.classes("studio-soft")
+        elif subject is not None and subject.digest and not is_pose:
+            print_.text = f"{title}: {subject.robot}, {subject.fingerprint}"
 
     refresh()
     results.changed.subscribe(refresh)
@@ -138,13 +134,20 @@ def notify(words: str, kind: str = "negative", *, stays: bool = False) -> None:
 
 @contextmanager
 def show_errors() -> Iterator[None]:
-    """Shows what the block raises as a message in the page, and goes on.
-
-    Mistakes of this program are shown, too, and logged with their traceback.
-    """
+    """Shows what the block raises as a message in the page, and goes on, as `say_errors`."""
     try:
         yield
     except Exception as problem:
-        if not isinstance(problem, (CdprError, OSError)):
-            _LOG.exception("in a handler of the studio's page")
-        notify(message(problem))
+        app.handle_exception(problem)
+
+
+def say_errors() -> None:
+    """Has the page that is being built show what its handlers raise as messages."""
+    ui.on_exception(lambda problem: notify(message(problem)))
+
+
+def _is_mistake(record: logging.LogRecord) -> bool:
+    return not isinstance(record.msg, CdprError | OSError)
+
+
+logging.getLogger("nicegui").addFilter(_is_mistake)  # refusals are for the page alone

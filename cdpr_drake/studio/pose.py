@@ -16,7 +16,7 @@ from cdpr_drake.geometry.poses import angles_from_rotation
 from cdpr_drake.palette import SLACK, nth_look
 from cdpr_drake.studio.dragging import busy_sign
 from cdpr_drake.studio.numbers import fact_rows, number_words
-from cdpr_drake.studio.panel import message, show_errors
+from cdpr_drake.studio.panel import message
 from cdpr_drake.studio.pose_answer import PoseAnswer, PoseAxis
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.tensions.methods import METHODS
@@ -32,7 +32,7 @@ OVER = 1.08
 
 def pose_panel(bench: Workbench) -> None:
     """Places sliders, choices and numbers."""
-    _place_sliders(bench)
+    sliders_follow = _place_sliders(bench)
     with ui.row().classes("studio-row items-end"):
         method = ui.select(_methods(bench), value=bench.method, label="Distribute tensions by")
         method.classes("grow").props("dense options-dense outlined").mark("method")
@@ -46,17 +46,15 @@ def pose_panel(bench: Workbench) -> None:
     problem.bind_visibility_from(problem, "text", bool)
 
     def choose() -> None:
-        with show_errors():
-            bench.method = str(method.value)
-            bench.reference = None if reference.value is None else float(reference.value)
-            bench.ask()
+        bench.method, bench.reference = str(method.value), reference.value
+        bench.ask()
 
     def go_home() -> None:
-        with show_errors():
-            bench.go_home()
-            bench.ask()
+        bench.go_home()
+        bench.ask()
 
     def refresh() -> None:
+        sliders_follow()
         answer = bench.answer
         waiting.set_visibility(answer is None and bench.problem is None)
         problem.text = "" if bench.problem is None else message(bench.problem)
@@ -81,28 +79,25 @@ def _methods(bench: Workbench) -> dict[str, str]:
     return {name: f"{name}: {METHODS[name].title}" for name in names}
 
 
-def _place_sliders(bench: Workbench) -> None:
-    """Places a slider and a field for each coordinate; they follow what another tab moves."""
+def _place_sliders(bench: Workbench) -> Callable[[], None]:
+    """Places a slider and a field for each coordinate; returns what has them follow the pose."""
     box = ui.element("div").classes("studio-sliders")
     axes: list[PoseAxis] = []
-    followers: list[Callable[[float], None]] = []
+    sliders: list[ui.slider] = []
 
     def follow() -> None:
-        if axes != bench.questions.coordinates.axes:
-            axes[:] = bench.questions.coordinates.axes
-            box.clear()
-            with box:
-                followers[:] = [_place_slider(bench, k, axis) for k, axis in enumerate(axes)]
-        for show, value in zip(followers, bench.coordinates, strict=True):
-            show(value)
+        if axes != bench.questions.axes:
+            axes[:] = bench.questions.axes
+            with box.clear():
+                sliders[:] = [_place_slider(bench, k, axis) for k, axis in enumerate(axes)]
+        for slider, value in zip(sliders, bench.coordinates, strict=True):
+            slider.value = value
 
-    follow()
-    bench.answered.subscribe(follow)
-    bench.robot.changed.subscribe(follow)
+    return follow
 
 
-def _place_slider(bench: Workbench, k: int, axis: PoseAxis) -> Callable[[float], None]:
-    """Places slider and field of a coordinate; returns what shows another value."""
+def _place_slider(bench: Workbench, k: int, axis: PoseAxis) -> ui.slider:
+    """Places slider and field of a coordinate; the field follows the slider, the pose both."""
 
     def refusal(words: Any) -> str | None:
         try:
@@ -115,37 +110,30 @@ def _place_slider(bench: Workbench, k: int, axis: PoseAxis) -> Callable[[float],
             f"[{axis.unit}]"
         )
 
-    def move(value: Any) -> None:
-        with show_errors():
-            if value is not None and np.isfinite(value):
+    def moved() -> None:
+        value = slider.value
+        if value is not None and np.isfinite(value):
+            field.value, field.error = _shown(value), None
+            if value != bench.coordinates[k]:
                 bench.move_to([*bench.coordinates[:k], value, *bench.coordinates[k + 1 :]])
-                show(value)
 
     def typed() -> None:
-        if field.value == _shown(bench.coordinates[k]):
+        if field.value == _shown(slider.value):
             field.error = None
         elif field.validate():
-            move(float(field.value))
-
-    def show(value: float) -> None:
-        slider.value = value
-        field.value, field.error = _shown(value), None
-
-    def follow(value: float) -> None:
-        if slider.value != value:
-            show(value)
+            slider.value = float(field.value)
 
     step = 0.1 if axis.unit == "deg" else max((axis.upper - axis.lower) / 1000.0, 1e-6)
     value = bench.coordinates[k]
     ui.label(axis.name).classes("studio-axis").props["title"] = axis.words
-    slider = ui.slider(min=axis.lower, max=axis.upper, step=step, value=value)
+    slider = ui.slider(min=axis.lower, max=axis.upper, step=step, value=value, on_change=moved)
     slider.props(f'aria-label="{axis.words} [{axis.unit}]" snap=false').mark(f"slider-{k}")
-    slider.on("update:model-value", lambda event: move(event.args), throttle=THROTTLE)
+    slider.on("update:model-value", lambda event: slider.set_value(event.args), throttle=THROTTLE)
     field = ui.input(value=_shown(value), validation=refusal).without_auto_validation()
     field.props(f'dense outlined suffix="{axis.unit}" aria-label="{axis.words}" hide-bottom-space')
     field.classes("studio-number").mark(f"coordinate-{k}")
     field.on("keydown.enter", typed).on("blur", typed)
-    return follow
+    return slider
 
 
 def _shown(value: float) -> str:
@@ -181,18 +169,16 @@ def _cable_table(answer: PoseAnswer) -> str:
     """A row for each cable: colour, name, tension as a bar between its limits, and lengths."""
     robot, rest, tensions = answer.robot, answer.rest, answer.tensions
     low, high = robot.tension_limits()
-    scale = bar_scale(tensions, high)
+    scale = _scale(tensions, high)
     ticks = "".join(
         f'<i class="tick" style="left:{100.0 * bound / scale:.2f}%"></i>'
         for bound in (low, high)
         if 0.0 < bound <= scale
     )
     none = np.full(len(robot.cables), np.nan)
-    columns = {
-        "length [m]": (none if answer.lengths is None else answer.lengths, 4),
-        "at rest [N]": (none if rest is None else rest.tensions, 2),
-        "unstrained [m]": (none if rest is None else rest.l0, 4),
-    }
+    lengths = none if answer.lengths is None else answer.lengths
+    at_rest, unstrained = (none, none) if rest is None else (rest.tensions, rest.l0)
+    heads = "cable", "tension", "[N]", "state", "length [m]", "at rest [N]", "unstrained [m]"
     rows = ""
     for k, (cable, tension) in enumerate(zip(robot.cables, tensions, strict=True)):
         color, is_slack = nth_look(k).color, bool(answer.slack[k])
@@ -207,19 +193,19 @@ def _cable_table(answer: PoseAnswer) -> str:
             f'<td class="bar"><div><b style="width:{width:.2f}%;'
             f'background:{SLACK if is_slack else color}"></b>{ticks}</div></td>'
             f'<td>{number_words(tension, 2, "f")}</td><td class="mark">{state}</td>'
+            f"<td>{number_words(lengths[k], 4, 'f')}</td>"
+            f"<td>{number_words(at_rest[k], 2, 'f')}</td>"
+            f"<td>{number_words(unstrained[k], 4, 'f')}</td></tr>"
         )
-        for values, digits in columns.values():
-            rows += f"<td>{number_words(values[k], digits, 'f')}</td>"
-        rows += "</tr>"
-    heads = "".join(f"<th>{head}</th>" for head in ("cable", "tension", "[N]", "state", *columns))
+    top = "".join(f"<th>{head}</th>" for head in heads)
     beyond = "" if high <= scale else f"; {high:g} N is beyond the scale"
     return (
         f'<table class="studio-cables"><caption>tensions, limits {low:g} to {high:g} N{beyond}'
-        f"</caption><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table>"
+        f"</caption><thead><tr>{top}</tr></thead><tbody>{rows}</tbody></table>"
     )
 
 
-def bar_scale(values: Array, upper: float) -> float:
+def _scale(values: Array, upper: float) -> float:
     """Where bars end: a power of two above all values, which changes seldom as they do.
 
     It is not above the upper limit, unless a value is.

@@ -29,19 +29,51 @@ T = TypeVar("T")
 USUAL_METHOD = "quadratic_program"
 
 
+@dataclass(frozen=True)
+class PoseAxis:
+    """A coordinate of the pose: name as x or ψ, words, unit m or deg, least and largest value."""
+
+    name: str
+    words: str
+    unit: str
+    lower: float
+    upper: float
+
+
 class RobotQuestions:
-    """Answers for one robot at many poses; what does not depend on the pose is computed once.
+    """A robot at many poses; what does not depend on the pose is computed once.
+
+    Coordinates of a pose are those that the platform can change: of a body in space position and
+    angles, R = Rx(φ) Ry(θ) Rz(ψ); in a plane or on a line those of its joint, along its axes.
 
     Attributes:
         robot: The robot.
         subject: The robot as what results are about.
-        coordinates: Those of its poses.
+        axes: What each coordinate is.
     """
 
     def __init__(self, robot: Robot) -> None:
         """About a robot; computes nothing yet."""
         self.robot, self.subject = robot, subject_of(robot)
-        self.coordinates = PoseCoordinates(robot)
+        self._joint, motion = robot.joint(), robot.motion_type()
+        units = [1.0] * motion.num_moves + [np.pi / 180.0] * motion.num_turns
+        self._units, self.axes = np.array(units), _axes(robot)
+
+    def coordinates(self, X_WP: RigidTransform) -> list[float]:
+        """The coordinates of a pose [m, deg]."""
+        return [float(value) for value in self._all(X_WP)[: len(self._units)] / self._units]
+
+    def pose(self, coordinates: Sequence[float]) -> RigidTransform:
+        """The pose with such coordinates [m, deg], else as at home."""
+        q = self._all(self.robot.home.transform())
+        q[: len(self._units)] = coordinates * self._units
+        return pose_from_angles(q[:3], q[3:]) if self._joint.is_floating else self._joint.pose_at(q)
+
+    def _all(self, X_WP: RigidTransform) -> Array:
+        """All coordinates of the joint [m, rad]; of a body in space position and angles."""
+        if self._joint.is_floating:
+            return np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
+        return self._joint.coordinates(X_WP)
 
     @cached_property
     def methods(self) -> list[str]:
@@ -60,27 +92,30 @@ class RobotQuestions:
 
         return pose_conditions(self.robot)
 
-    def at(
-        self, X_WP: RigidTransform, method: str = USUAL_METHOD, reference: float | None = None
-    ) -> PoseAnswer:
-        """Everything at a pose.
 
-        Args:
-            X_WP: The pose.
-            method: A name of `tensions.METHODS`.
-            reference: Desired tension of all cables [N], for methods that need one.
-        """
-        return PoseAnswer(self, X_WP, method, reference)
+def _axes(robot: Robot) -> list[PoseAxis]:
+    """What the coordinates of a robot's platform are, within the frame."""
+    joint, motion, home = robot.joint(), robot.motion_type(), robot.home.position
+    # Home may lie outside a frame that was assumed.
+    box = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
+    corners = np.array(list(product(*zip(*box, strict=True)))).T
+    rows = joint.X_WF.inverse().multiply(corners)
+    place = "W" if joint.is_as_world() else "the plane" if motion.is_plane else "the line"
+    names, words = "ψ", "turn about the plane's normal"
+    if joint.is_floating:
+        names, words = "φθψ", "R = Rx(φ) Ry(θ) Rz(ψ)"
+    return [
+        *(PoseAxis(name, f"{name} of Po in {place}", "m", float(min(row)), float(max(row)))
+          for name, row in zip("xyz"[: motion.num_moves], rows, strict=False)),
+        *(PoseAxis(name, words, "deg", -180.0, 180.0) for name in names[: motion.num_turns]),
+    ]  # fmt: skip
 
 
 class PoseAnswer:
     """A robot at a pose; what cannot be had is None, and a line says why.
 
     Attributes:
-        robot: The robot.
         subject: What this is about.
-        X_WP: The pose.
-        method: Name of the tension distribution method.
         tensions: As `cdpr tension` prints them, shape (m,) [N]; NaN where there are none.
         slack: True for cables without tension, shape (m,).
         status: Verdict on the tensions; empty without any.
@@ -95,9 +130,17 @@ class PoseAnswer:
     """
 
     def __init__(
-        self, about: RobotQuestions, X_WP: RigidTransform, method: str, reference: float | None
-    ) -> None:
-        """Computes it; arguments as of `RobotQuestions.at`."""
+        self, about: RobotQuestions, X_WP: RigidTransform, method: str = USUAL_METHOD,
+        reference: float | None = None,
+    ) -> None:  # fmt: skip
+        """Computes it.
+
+        Args:
+            about: The robot.
+            X_WP: The pose.
+            method: A name of `tensions.METHODS`.
+            reference: Desired tension of all cables [N], for methods that need one.
+        """
         from cdpr_drake.analyses.statics.static import solve_static
         from cdpr_drake.analyses.tensions import solve_tensions
         from cdpr_drake.analyses.workspaces.conditions import MEASURES, Poses
@@ -144,64 +187,3 @@ def _or_refusal(question: Callable[[], T]) -> tuple[T | None, str]:
 
 def _finite(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else float(value)
-
-
-@dataclass(frozen=True)
-class PoseAxis:
-    """A coordinate of the pose: name as x or ψ, words, unit m or deg, least and largest value."""
-
-    name: str
-    words: str
-    unit: str
-    lower: float
-    upper: float
-
-
-class PoseCoordinates:
-    """The coordinates that a robot's platform can change, in the order of their axes.
-
-    Of a body in space position and angles, R = Rx(φ) Ry(θ) Rz(ψ); of a platform in a plane or on a
-    line, the coordinates of its joint, along the plane's axes.
-
-    Attributes:
-        axes: What each is, within the frame.
-    """
-
-    def __init__(self, robot: Robot) -> None:
-        """Of a robot; what it cannot change is as at its home pose."""
-        self._joint, self._home = robot.joint(), robot.home.transform()
-        motion, home = robot.motion_type(), robot.home.position
-        # Home may lie outside a frame that was assumed.
-        box = np.minimum(robot.frame.lower, home), np.maximum(robot.frame.upper, home)
-        corners = np.array(list(product(*zip(*box, strict=True)))).T
-        corners = self._joint.X_WF.inverse().multiply(corners)
-        first, names, words = 2, "ψ", "turn about the plane's normal"
-        if self._joint.is_floating:
-            first, names, words = 3, "φθψ", "R = Rx(φ) Ry(θ) Rz(ψ)"
-        place = "the plane" if motion.is_plane else "the line"
-        place = "W" if self._joint.is_as_world() else place
-        moves, turns = motion.num_moves, motion.num_turns
-        self._changed = [*range(moves), *range(first, first + turns)]
-        self._units = np.array([1.0] * moves + [np.pi / 180.0] * turns)
-        self.axes = [
-            *(PoseAxis(name, f"{name} of Po in {place}", "m", float(min(row)), float(max(row)))
-              for name, row in zip("xyz"[:moves], corners, strict=False)),
-            *(PoseAxis(name, words, "deg", -180.0, 180.0) for name in names[:turns]),
-        ]  # fmt: skip
-
-    def values(self, X_WP: RigidTransform) -> list[float]:
-        """The coordinates of a pose [m, deg]."""
-        values = self._all(X_WP)[self._changed] / self._units
-        return [float(value) for value in values]
-
-    def pose(self, values: Sequence[float]) -> RigidTransform:
-        """The pose with such coordinates [m, deg]."""
-        q = self._all(self._home)
-        q[self._changed] = values * self._units
-        return pose_from_angles(q[:3], q[3:]) if self._joint.is_floating else self._joint.pose_at(q)
-
-    def _all(self, X_WP: RigidTransform) -> Array:
-        """All coordinates of the joint [m, rad]; of a body in space position and angles."""
-        if self._joint.is_floating:
-            return np.concatenate([X_WP.translation(), angles_from_rotation(X_WP.rotation())])
-        return self._joint.coordinates(X_WP)

@@ -94,14 +94,13 @@ class Results:
     def wait_for(self, name: str, longest: float) -> None:
         """Says nothing of a result that is about something else: the next one comes at once.
 
-        That holds until it is shown, and at most for so long [s].
+        That holds for so long [s].
         """
         self._awaited[name] = monotonic() + longest
         asyncio.get_running_loop().call_later(longest + CLOCK, self.changed.emit)
 
     def show(self, name: str, subject: Subject | None) -> None:
         """Says what the result of a name is about from now on; None: there is none any more."""
-        self._awaited.pop(name, None)
         before, self._subjects[name] = self.subject(name), subject
         if before != subject:
             self.changed.emit()

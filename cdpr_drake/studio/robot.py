@@ -103,7 +103,7 @@ async def open_dialog(bench: Workbench) -> None:
     async def receive(event: events.MultiUploadEventArguments) -> None:
         content = {file.name: await file.read() for file in event.files}
         read = partial(bench.files.upload, content)
-        if not await attempt(partial(take, read, bench.take_upload)):
+        if not await attempt(partial(take, read, bench.take_opened)):
             upload.reset()
 
     robots, files = await asyncio.to_thread(_names, bench, UPLOADS)

@@ -44,11 +44,13 @@ class OpenedRobot:
         text: That of a robot file.
         path: Where messages say that it stands.
         notes: What to know of a file of another tool, a sentence each.
+        name: Of the package, or of the file of the folder that has the text; empty: neither.
     """
 
     text: str
     path: Path
     notes: list[str]
+    name: str = ""
 
 
 class RobotFiles:
@@ -90,7 +92,7 @@ class RobotFiles:
             CdprError: There is none, its file leads out of the folder, or it is not accepted.
         """
         if name in robot_names():
-            return OpenedRobot(robot_text(name), robot_file(name).resolve(), [])
+            return OpenedRobot(robot_text(name), robot_file(name).resolve(), [], name)
         path = self._folder.path(name)
         if not path.is_file():
             raise RobotFileError(f"{name[:200]}: there is no such file in the working folder")
@@ -98,7 +100,7 @@ class RobotFiles:
 
     def _read_file(self, path: Path, folder: Path) -> OpenedRobot:
         """The robot of a file, which stands in a folder from now on."""
-        notes: list[str] = []
+        source, notes = path, list[str]()
         if path.suffix.lower() not in UPLOADS:
             raise RobotFileError(
                 f"{path.name[:100]}: found the ending {path.suffix[:20]!r}; accepted: "
@@ -120,8 +122,9 @@ class RobotFiles:
                 text = path.read_text(encoding="utf-8")
             except UnicodeDecodeError as problem:
                 raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
-        self.read(text, folder / path.name)
-        return OpenedRobot(text, folder / path.name, notes)
+        path = folder / path.name
+        self.read(text, path)
+        return OpenedRobot(text, path, notes, self._folder.shown(path) if path == source else "")
 
     def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
         """A robot from files that came over the network, by their names; one, or those of a model.

@@ -65,9 +65,9 @@ class RobotScene:
         self.meshcat: Meshcat = open_meshcat()
         self.door = str(private_door(self.meshcat))
         self._robot: Robot | None = None
-        self._picture: RobotPicture | None = None
+        self._picture: RobotPicture
         self._workspace: Solid | None = None
-        self._dark, self._solids, self._keeps_shader = False, "", False
+        self._dark, self._solids = False, ""
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
         """Draws a robot at a pose.
@@ -77,62 +77,55 @@ class RobotScene:
             X_WP: Pose of the platform [m].
             tensions: Shape (m,) [N]; a slack cable is red, one with NaN grey.
         """
-        if robot is not self._robot or self._picture is None:
-            self._picture = self._place(robot)
+        if robot is not self._robot:
+            self._place(robot)
         self._picture.draw(X_WP, tensions)
         anchors = X_WP.multiply(robot.cable_set().p_PB)
         for k in range(len(robot.cables)):
             self.meshcat.SetTransform(f"{ANCHORS}/{k}", RigidTransform(anchors[:, k]))
 
-    def _place(self, robot: Robot) -> RobotPicture:
+    def _place(self, robot: Robot) -> None:
         """Puts another robot into the scene, or the same one after a change."""
-        before, self._robot, picture = self._robot, robot, self._picture
+        before, solids = self._robot, _solids(robot)
         colors = [nth_look(k).color for k in range(len(robot.cables))]
-        full_scale, size, solids = robot.tension_limits()[1], _size(robot), _solids(robot)
-        is_same = picture is not None and solids == self._solids
-        self._solids = solids
-        if picture is not None and is_same:
+        full_scale, size, meshcat = robot.tension_limits()[1], _size(robot), self.meshcat
+        if before is not None and solids == self._solids:
             # A diagram takes memory that Drake is slow to give back, and the same solids need none.
-            if not picture.cables.move_to(robot, full_scale):
-                self.meshcat.Delete("cables")
-                picture.cables = CablePictures(self.meshcat, robot, full_scale, colors=colors)
+            if not self._picture.cables.move_to(robot, full_scale):
+                meshcat.Delete("cables")
+                self._picture.cables = CablePictures(meshcat, robot, full_scale, colors=colors)
         else:
             # Who looks at a point that moves keeps the view.
             look = (
                 before is None or robot.name != before.name
                 or abs(size - _size(before)) > 0.25 * size
             )  # fmt: skip
-            self.meshcat.Delete("cables")
-            self.meshcat.Delete("visualizer")
-            picture = RobotPicture(
-                robot, full_scale, meshcat=self.meshcat, colors=colors, look=look
+            for path in ("cables", "visualizer", "studio"):
+                meshcat.Delete(path)
+            self._picture = RobotPicture(
+                robot, full_scale, meshcat=meshcat, colors=colors, look=look
             )
             if look:
-                look_at_robot(self.meshcat, robot)
+                look_at_robot(meshcat, robot)
             self.set_dark(self._dark)
-        if before is None or not is_same or len(before.cables) != len(colors):
-            self.meshcat.Delete("studio")  # points that can be dragged; they only move then
             for k, color in enumerate(colors):
                 for path, share in ((EXITS, 1.0), (ANCHORS, 0.6)):
                     shape = Sphere(POINT_SIZE * size * share)
-                    self.meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
+                    meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
+            p_WP = np.tile(robot.home.position, (3, 1))
+            add_solid(meshcat, SHADER, p_WP, np.array([[0, 1, 2]]), WORKSPACE_COLOR)
         for k, p_WA in enumerate(robot.cable_set().p_WA.T):
-            self.meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(p_WA))
-        return picture
+            meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(p_WA))
+        self._robot, self._solids = robot, solids
 
     def show_workspace(self, solid: Solid | None) -> None:
         """Draws the workspace that follows the robot, or takes it out."""
-        if solid is self._workspace:
-            return
-        self._workspace = solid
-        if solid is None:
-            self.meshcat.Delete(WORKSPACE)
-        else:
-            if not self._keeps_shader:
-                inside = np.tile(solid[0].mean(axis=0), (3, 1))
-                add_solid(self.meshcat, SHADER, inside, np.array([[0, 1, 2]]), WORKSPACE_COLOR)
-                self._keeps_shader = True
-            add_solid(self.meshcat, WORKSPACE, *solid, WORKSPACE_COLOR)
+        if solid is not self._workspace:
+            self._workspace = solid
+            if solid is None:
+                self.meshcat.Delete(WORKSPACE)
+            else:
+                add_solid(self.meshcat, WORKSPACE, *solid, WORKSPACE_COLOR)
 
     def set_dark(self, dark: bool) -> None:
         """Paints the background for a dark page, or a light one."""
@@ -142,7 +135,7 @@ class RobotScene:
 
     def redraw(self) -> None:
         """The next `show` draws everything anew, as after others have drawn into the scene."""
-        self._robot = self._picture = self._workspace = None
+        self._robot = self._workspace = None
 
 
 def look_at_robot(meshcat: Meshcat, robot: Robot) -> None:
@@ -167,10 +160,10 @@ def _size(robot: Robot) -> float:
 
 
 def _solids(robot: Robot) -> str:
-    """What the solids of a scene follow from: all but the cables, with eight digits."""
+    """What the solids of a scene follow from, with eight digits: all but places of the cables."""
     return repr(
         (robot.name, robot.motion, robot.axis, robot.plane_height, robot.home, robot.platform,
-         robot.frame, robot.cameras)
+         robot.frame, robot.cameras, len(robot.cables))
     )  # fmt: skip
 
 

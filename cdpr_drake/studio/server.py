@@ -215,5 +215,5 @@ def _relay_scene(app: FastAPI) -> None:
 
 async def _scene(request: HTTPConnection) -> aiohttp.ClientSession:
     """What asks the scene of a request's session; who goes away does not end its making."""
-    path = await asyncio.shield(asyncio.wrap_future(request.scope[BENCH].scene_address()))
+    path = await asyncio.shield(asyncio.wrap_future(request.scope[BENCH].scene_address))
     return aiohttp.ClientSession(connector=aiohttp.UnixConnector(path))

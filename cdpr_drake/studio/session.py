@@ -6,6 +6,7 @@ import asyncio
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -19,7 +20,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator, Latest
+from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
@@ -53,26 +54,20 @@ class Workbench:
     """What one browser session works on; its tabs show the same.
 
     Attributes:
-        folder: Where files are read and written.
-        calculator: The thread for numbers and scenes, that of the server.
-        files: Reads robots.
         robot: The robot's document.
-        coordinates: Of the platform's pose, as `PoseCoordinates` has them [m, deg].
+        coordinates: Of the platform's pose, as `RobotQuestions` has them [m, deg].
         X_WP: The pose.
         method: How tensions are distributed, a name of `tensions.METHODS`.
         reference: Desired tension for methods that need one [N].
         answer: What is known about the robot at a pose; None: nothing yet.
         problem: Why there is no answer, which is a mistake of this program; None: there is one.
         answered: Called when there is another answer or problem.
+        is_computing: True until what was asked last is answered.
         is_dragged: True while a point of the robot is in a hand.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
         panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
-        jobs: Work in processes of its own, the same for all sessions of a server.
-        results: What is shown of results, and what each is about.
         drawn: What the scene shows in the place of the robot; None: the robot.
-        live: The static workspace that follows the robot while it is changed.
-        questions: What asks about the robot as it is now.
     """
 
     def __init__(
@@ -92,27 +87,29 @@ class Workbench:
         self.jobs = JobManager() if jobs is None else jobs
         self._make_commands = commands
         self._kept: dict[Any, Any] = {}
-        where = robot_file(robot).resolve()
-        self.files = RobotFiles(folder, where.parent)
+        path = robot_file(robot).resolve()
+        self.files = RobotFiles(folder, path.parent)
         self.robot: Document[Robot] = Document(
-            robot_text(robot, "the studio"), where, self.files.read
+            robot_text(robot, "the studio"), path, self.files.read
         )
-        self._shipped = {robot_file(name).resolve(): name for name in robot_names()}
-        self._texts: dict[Path, str] = {}  # of robot files
-        if where.is_file() and not is_foreign(where):  # of which a name with rails has another text
-            self._texts[where] = where.read_text(encoding="utf-8")
-        self._assumed: dict[Path, list[str]] = {}
+        self._opened: dict[Path, OpenedRobot] = {}
+        if path.is_file() and not is_foreign(path):  # of which a name with rails has another text
+            own = folder.shown(path) if path.is_relative_to(folder.root) else ""
+            name = robot if robot in robot_names() else own
+            text = path.read_text(encoding="utf-8")
+            self._opened[path] = OpenedRobot(text, path, [], name)
         self.method = USUAL_METHOD
         self.reference: float | None = None
         self.answer: PoseAnswer | None = None
         self.problem: BaseException | None = None
         self.answered = Event[[]]()
-        self.is_dragged = False
+        self.is_computing = self.is_dragged = False
         self.dark: bool | None = None
         self.results = Results(lambda: self.subject)
         self.drawn: Subject | None = None
-        self._latest = Latest(self.calculator, self._answer_came)
+        self._question: Callable[[], PoseAnswer] | None = None
         self._telling: asyncio.TimerHandle | None = None
+        self._scene: RobotScene | None = None
         self.live = LiveWorkspace(self.calculator, self.scene)
         self.questions = RobotQuestions(self.robot.value)
         self.go_home()
@@ -130,79 +127,47 @@ class Workbench:
         return self._make_commands()
 
     @property
-    def is_computing(self) -> bool:
-        """True until what was asked last is answered."""
-        return self._latest.is_busy
-
-    @property
     def subject(self) -> Subject:
         """The robot and the pose that are open: what a result should be about."""
         return self.questions.subject.at(self.X_WP)
 
     @property
-    def file(self) -> str:
-        """Name of the robot's file in the folder; empty: it has none yet."""
+    def _file(self) -> OpenedRobot:
+        """What was read or written last where the robot stands."""
         path = self.robot.path
-        own = path in self._texts and path.is_relative_to(self.folder.root)
-        return self.folder.shown(path) if own else ""
+        return self._opened.get(path, OpenedRobot("", path, []))
 
     @property
-    def is_saved(self) -> bool:
-        """Whether the robot's file has the robot as it is."""
-        return self._texts.get(self.robot.path) == self.robot.text
+    def file(self) -> str:
+        """Name of the robot's file in the folder; empty: it has none yet."""
+        return "" if self._file.name in robot_names() else self._file.name
 
     @property
     def command_name(self) -> str:
         """By which commands know the robot as it is, in the folder; empty: they do not."""
-        return self._shipped.get(self.robot.path, self.file) if self.is_saved else ""
+        return self._file.name if self._file.text == self.robot.text else ""
 
     @property
     def state(self) -> str:
         """How the robot stands to its file, in a word or two."""
         if self.file:
-            return "saved" if self.is_saved else "edited, not saved"
+            return "saved" if self.command_name else "edited, not saved"
         return "of the package" if self.command_name else "not saved"
 
     @property
     def assumed(self) -> list[str]:
         """What was assumed of the robot when another tool's file was read, a sentence each."""
-        return self._assumed.get(self.robot.path, [])
+        return self._file.notes
 
     def forget_assumed(self) -> None:
         """Says no more what was assumed, once somebody has read it."""
-        self._assumed.pop(self.robot.path, None)
+        self._opened[self.robot.path] = replace(self._file, notes=[])
         self.robot.changed.emit()
 
-    def open(self, name: str) -> OpenedRobot:
-        """Works with a robot of the package, or with a file of the folder.
-
-        Raises:
-            CdprError: It is not accepted; nothing has changed.
-        """
-        return self.take_opened(self.files.open(name))
-
-    def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
-        """Works with a robot from uploaded files, which has no file in the folder yet.
-
-        Raises:
-            CdprError: It is not accepted; nothing has changed.
-        """
-        return self.take_upload(self.files.upload(files))
-
-    def take_opened(self, opened: OpenedRobot, uploaded: bool = False) -> OpenedRobot:
-        """Works with what `files.open`, or `files.upload`, has read, perhaps in another thread."""
-        if uploaded:
-            self._texts.pop(opened.path, None)
-        elif not opened.notes:
-            self._texts[opened.path] = opened.text
-        if opened.notes:
-            self._assumed[opened.path] = opened.notes
+    def take_opened(self, opened: OpenedRobot) -> None:
+        """Works with what `files` has read, perhaps in another thread."""
+        self._opened[opened.path] = opened
         self.robot.change(opened.text, opened.path)
-        return opened
-
-    def take_upload(self, opened: OpenedRobot) -> OpenedRobot:
-        """Works with what `files.upload` has read."""
-        return self.take_opened(opened, uploaded=True)
 
     def save(self, name: str, overwrite: bool) -> None:
         """Writes the robot's file into the folder, and works with that.
@@ -210,22 +175,12 @@ class Workbench:
         Raises:
             CdprError: The name is not accepted, the file is there already, or cannot be written.
         """
-        self.take_saved(*self.write(name, overwrite))
-
-    def write(self, name: str, overwrite: bool) -> tuple[Path, str]:
-        """Writes the robot's file, perhaps in another thread; its path and text, see `save`."""
         if not name.lower().endswith((".yaml", ".yml")):
             raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
         path, text = self.folder.path(name), self.robot.text
         self.files.read(text, path)  # it may name files that are not there
         self.folder.write(name, text, overwrite or name == self.file)
-        return path, text
-
-    def take_saved(self, path: Path, text: str) -> None:
-        """Works with a file that `write` has written."""
-        self._texts[path] = text
-        if self.assumed:
-            self._assumed[path] = self.assumed
+        self._opened[path] = OpenedRobot(text, path, self.assumed, self.folder.shown(path))
         self.robot.belongs_to(path)
 
     def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
@@ -276,22 +231,30 @@ class Workbench:
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""
         self.X_WP: RigidTransform = self.questions.robot.home.transform()
-        self.coordinates = self.questions.coordinates.values(self.X_WP)
+        self.coordinates = self.questions.coordinates(self.X_WP)
 
     def move_to(self, coordinates: Sequence[float]) -> None:
-        """Moves the platform to coordinates, as `PoseCoordinates` has them, and asks there."""
+        """Moves the platform to coordinates, as `RobotQuestions` has them, and asks there."""
         self.is_dragged = False  # also where a browser went away with a point in its hand
         self.coordinates = [float(value) for value in coordinates]
-        self.X_WP = self.questions.coordinates.pose(self.coordinates)
+        self.X_WP = self.questions.pose(self.coordinates)
         self.ask()
 
     def ask(self) -> None:
         """Asks what there is to know, and draws it; `answered` tells, of several the last."""
-        if not self.is_computing:
-            self.results.wait_for(POSE_NUMBERS, LATE)
         place = self.X_WP, self.method, self.reference
-        self._latest.ask(partial(self._answer, self.questions, *place))
+        self._question = partial(self._answer, self.questions, *place)
+        if not self.is_computing:
+            self._go_on()
         self.results.changed.emit()
+
+    def _go_on(self) -> None:
+        """Has the newest question answered; those before it are dropped."""
+        question, self._question = self._question, None
+        self.is_computing = question is not None
+        if question is not None:
+            self.results.wait_for(POSE_NUMBERS, LATE)
+            self.calculator.run(question, self._answer_came)
 
     def _answer(
         self, questions: RobotQuestions, X_WP: RigidTransform, method: str, reference: float | None
@@ -299,7 +262,7 @@ class Workbench:
         """Answers, and draws the robot in any case; in the calculator's thread."""
         tensions = np.full(len(questions.robot.cables), np.nan)
         try:
-            answer = questions.at(X_WP, method, reference)
+            answer = PoseAnswer(questions, X_WP, method, reference)
             tensions = answer.tensions
         finally:
             # All is computed before: what comes to the browser at once is one picture, not two.
@@ -309,14 +272,13 @@ class Workbench:
         return answer
 
     def _answer_came(self, future: Future[PoseAnswer]) -> None:
+        self._go_on()
         self.problem = future.exception()
         if self.problem is None:
             if self.answer is None:  # so that kernels are there before somebody drags
                 self.calculator.submit(partial(sketch_workspace, self.robot.value, COARSE))
             self.answer = future.result()
             self.results.show(POSE_NUMBERS, self.answer.subject)
-        if self.is_computing:
-            self.results.wait_for(POSE_NUMBERS, LATE)
         if not self.is_dragged:
             self._tell()
         elif self._telling is None:
@@ -340,24 +302,19 @@ class Workbench:
 
     def scene(self) -> RobotScene:
         """The scene, made at the first call; for the calculator's thread only."""
+        if self._scene is None:
+            from cdpr_drake.studio.scene import RobotScene
+
+            self._scene = RobotScene()
         return self._scene
 
     @cached_property
-    def _scene(self) -> RobotScene:
-        from cdpr_drake.studio.scene import RobotScene
-
-        return RobotScene()
-
     def scene_address(self) -> Future[str]:
         """Path of the socket behind which the scene is; the server relays it to the page.
 
         The robot is drawn there first, with grey cables: what is known of it may have to wait for
         kernels that are compiled.
         """
-        return self._address
-
-    @cached_property
-    def _address(self) -> Future[str]:
         robot, X_WP = self.questions.robot, self.X_WP
 
         def open_scene() -> str:

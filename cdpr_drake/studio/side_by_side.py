@@ -10,7 +10,7 @@ import numpy as np
 
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.declarations import settings_of
-from cdpr_drake.studio.pose_answer import RobotQuestions
+from cdpr_drake.studio.pose_answer import PoseAnswer, RobotQuestions
 
 Value = float | str | None
 
@@ -72,7 +72,7 @@ def _fields(settings: Any, before: str) -> Iterator[tuple[str, Value]]:
 
 
 def _at_home(robot: Robot) -> Iterator[tuple[str, Value]]:
-    answer = RobotQuestions(robot).at(robot.home.transform())
+    answer = PoseAnswer(RobotQuestions(robot), robot.home.transform())
     tensions = answer.tensions[np.isfinite(answer.tensions)]
     if len(tensions):
         yield "at home: least tension [N]", float(tensions.min())
