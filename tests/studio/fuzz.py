@@ -109,7 +109,7 @@ async def _type(user, bench, chance: random.Random, marks: list[str]) -> str:
 def _upload(bench, files: dict[str, bytes]) -> str:
     before, words = bench.robot.text, None
     try:
-        bench.upload(files)
+        bench.take_opened(bench.files.upload(files))
     except CdprError as problem:
         words = str(problem)
     assert words is None or (words and bench.robot.text == before)

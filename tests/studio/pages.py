@@ -66,7 +66,7 @@ class HeldPage:
     async def begin(self):
         """The robot as it was in the beginning, and nothing that was said."""
         self.user.notify.messages.clear()
-        self.bench.open(self._robot)
+        self.bench.take_opened(self.bench.files.open(self._robot))
         await until(lambda: self.bench.answer is not None and not self.bench.is_computing)
 
     async def _hold(self, folder):

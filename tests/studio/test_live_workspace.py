@@ -1,29 +1,25 @@
 """The static workspace that follows a robot while it is changed, and points that are dragged."""
 
-import json
 import threading
 
 import numpy as np
 import pytest
 from nicegui import ElementFilter
 
-from cdpr_drake.cli.app import main
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import live_workspace
 from cdpr_drake.studio import session as sessions
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.live_workspace import COARSE, FINE, sketch_grid, sketch_workspace
-from cdpr_drake.studio.scene import SHADER, WORKSPACE, RobotScene
+from cdpr_drake.studio.scene import EXITS, SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench
+from tests.cli.commands import told
 from tests.studio.pages import field, settled, type_into, until
 
 ROBOT = "acrobot_large"
 
 THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])
 """Places for the first exit point of acrobot_large [m]."""
-
-SHARE_OF_COUNT = 0.35
-"""By which a grid may have more or fewer poses than it shall: counts of three axes are whole."""
 
 
 @pytest.fixture(scope="module")
@@ -35,30 +31,49 @@ def calculator():
 
 @pytest.fixture
 def alone(tmp_path, calculator, monkeypatch):
-    """A workbench without a page, whose workspace is refined when it is asked for."""
+    """A workbench without a page, whose workspace is not refined."""
     monkeypatch.setattr(live_workspace, "REST", 1e6)
     return Workbench(WorkingFolder(tmp_path), calculator=calculator)
 
 
-def in_scene(bench, path=WORKSPACE):
-    return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result()
+def in_scene(bench, *paths):
+    def has(scene):
+        return [scene.meshcat.HasPath(path) for path in paths or [WORKSPACE]]
+
+    return bench.calculator.submit(lambda: has(bench.scene())).result()
 
 
 async def drag(bench, p_W, done=False):
-    bench.drag_point("exit", 0, p_W, done=done)
+    words = bench.drag_point("exit", 0, p_W, done=done)
+    await settled(bench)
+    return words
+
+
+async def open_robot(bench, name):
+    bench.take_opened(bench.files.open(name))
     await settled(bench)
 
 
-async def test_a_sketch_is_what_the_command_computes(alone, tmp_path, capsys):
-    await drag(alone, THERE, done=True)
+async def test_a_point_is_dragged_and_the_workspace_is_what_the_command_computes(
+    alone, tmp_path, capsys
+):
+    start = alone.robot.text
+    alone.ask()
+    await settled(alone)
+    before = alone.answer.tensions
+    assert await drag(alone, FARTHER) == ""
+    assert not np.allclose(alone.answer.tensions, before)
+    words = await drag(alone, np.array([1e6, 0.0, 0.0]), done=True)
+    assert "found 1000000.0; accepted: 3 numbers" in words
+    assert alone.robot.text == start
+    np.testing.assert_array_equal(alone.answer.tensions, before)
+    assert await drag(alone, THERE, done=True) == ""
+    assert alone.robot.value.cables[0].exit_point.tolist() == THERE.tolist()
     alone.save("moved.yaml", overwrite=False)
     sketch = alone.live.sketch
-    grid = ",".join(str(count) for count in sketch.counts)
-    with pytest.raises(SystemExit):
-        main(["workspace", str(tmp_path / "moved.yaml"), "--grid", grid, "--json",
-              "--out", str(tmp_path / "own")])  # fmt: skip
-    told = json.loads(capsys.readouterr().out)["workspaces"]["static"]
-    assert told["corners_m3"] == sketch.volume.value
+    options = "--grid", ",".join(map(str, sketch.counts)), "--out", tmp_path / "own"
+    computed = told(capsys, "workspace", tmp_path / "moved.yaml", *options)["workspaces"]
+    assert computed["static"]["corners_m3"] == sketch.volume.value
     assert 0.0 < sketch.volume.share < 1.0
 
 
@@ -66,59 +81,55 @@ async def test_a_sketch_is_what_the_command_computes(alone, tmp_path, capsys):
 @pytest.mark.parametrize("poses", [COARSE, FINE])
 def test_grids_have_about_the_poses_that_are_wanted(name, poses):
     grid = sketch_grid(load_robot(name), poses)
-    assert abs(grid.size / poses - 1.0) < SHARE_OF_COUNT
+    assert abs(grid.size / poses - 1.0) < 0.35  # counts of three axes are whole
     steps = grid.steps[grid.steps > 0.0]
     assert np.ptp(steps) < 0.2 * np.max(steps)
 
 
-async def test_it_is_drawn_when_a_point_moves_and_not_before(alone):
-    assert not in_scene(alone)
+async def test_it_is_drawn_when_a_point_moves_and_not_before(alone, monkeypatch):
+    live = alone.live
+    alone.ask()
+    await settled(alone)
+    assert in_scene(alone, WORKSPACE, SHADER) == [False, True]  # which stays compiled
     await drag(alone, THERE)
-    assert in_scene(alone)
-    coarse = alone.live.sketch
-    assert not alone.live.is_fine
-    await drag(alone, FARTHER)
-    assert alone.live.sketch.volume != coarse.volume
-    await alone.live.refine()
-    assert alone.live.is_fine
-    assert np.prod(alone.live.sketch.counts) > 10 * np.prod(coarse.counts)
+    coarse = live.sketch
+    assert (in_scene(alone), coarse.poses) == ([True], COARSE)
+    with monkeypatch.context() as patch:
+        patch.setattr(live_workspace, "REST", 0.0)
+        await drag(alone, FARTHER)
+        await until(lambda: live.sketch.poses == FINE)
+    assert live.sketch.volume != coarse.volume
+    assert np.prod(live.sketch.counts) > 10 * np.prod(coarse.counts)
     alone.move_to(alone.coordinates)
     await settled(alone)
-    assert alone.live.is_fine  # no robot has changed
+    assert live.sketch.poses == FINE  # no robot has changed
     await drag(alone, THERE)
-    assert not alone.live.is_fine
-    assert alone.live.sketch.volume == coarse.volume
-    alone.live.want(False)
+    assert (live.sketch.poses, live.sketch.volume) == (COARSE, coarse.volume)
+    live.want(False)
     await drag(alone, FARTHER)
-    assert not in_scene(alone)
-    assert in_scene(alone, SHADER)  # which stays compiled
-    alone.live.want(True)
-    assert in_scene(alone)
+    assert in_scene(alone) == [False]
+    live.want(True)
+    assert in_scene(alone) == [True]
 
 
-async def test_a_changed_value_has_it_follow_and_another_robot_takes_it_away(alone):
+async def test_the_scene_follows_the_robot_and_has_no_workspace_of_another_one(alone):
     await drag(alone, THERE, done=True)
-    assert alone.live.sketch.volume == sketch_workspace(alone.robot.value, COARSE).volume
     alone.calculator.submit(lambda: alone.scene().meshcat.Delete(WORKSPACE)).result()
     alone.draw(lambda scene: scene.redraw())  # as after others have drawn into the scene
     alone.ask()
     await settled(alone)
-    assert in_scene(alone)
-    alone.open("acrobot_small")
-    await settled(alone)
-    assert not in_scene(alone)
+    assert in_scene(alone, WORKSPACE, f"{EXITS}/7") == [True, True]
+    await open_robot(alone, "planar")
+    assert in_scene(alone, WORKSPACE, f"{EXITS}/2", f"{EXITS}/7") == [False, True, False]
     assert alone.live.sketch is None
-
-
-async def test_a_robot_without_a_static_workspace_says_why(alone):
-    alone.open("grab_four")
+    await open_robot(alone, "grab_four")
     await drag(alone, alone.robot.value.cable_set().p_WA[:, 0] + 0.01)
-    assert "degrees of freedom" in alone.live.problem
-    assert not in_scene(alone)
+    assert "degrees of freedom" in alone.live.sketch.problem
+    assert in_scene(alone) == [False]
 
 
-async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, user, monkeypatch):
-    computed, bench = [], held.bench
+async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(user, bench, monkeypatch):
+    computed = []
 
     def counted(robot, poses):
         computed.append((poses, robot.cables[0].exit_point[0]))
@@ -126,31 +137,23 @@ async def test_of_many_robots_the_newest_is_computed_and_the_rest_dropped(held, 
 
     monkeypatch.setattr(live_workspace, "sketch_workspace", counted)
     monkeypatch.setattr(live_workspace, "REST", 0.05)
-    places = np.linspace(-0.45, -0.3, 31)
-    for x in places:
+    for x in np.linspace(-0.45, -0.3, 31):
         bench.drag_point("exit", 0, np.array([x, -0.5, 1.1]), done=False)
-    await until(lambda: bench.live.is_fine)
+    await until(lambda: "refined" in field(user, "live-size").text)
     coarse = [x for poses, x in computed if poses == COARSE]
     assert len(coarse) < 4
-    assert coarse[-1] == pytest.approx(places[-1])
+    assert coarse[-1] == pytest.approx(-0.3)
     assert computed[-1] == (FINE, coarse[-1])
-    words = field(user, "live-size").text
-    assert "refined" in words
-    assert "% of the grid's box" in words
+    assert "% of the grid's box" in field(user, "live-size").text
     assert "limits 0 to 60 N" in field(user, "live-tensions").text
     type_into(user, "cell-cables-0-exit_point-0", "-0.35")
-    await until(lambda: computed[-1][1] == pytest.approx(-0.35))
+    await until(lambda: computed[-1] == (FINE, pytest.approx(-0.35)))
     await until(lambda: "refined" in field(user, "live-size").text)
 
 
 async def test_the_scene_comes_before_the_page(alone, monkeypatch):
-    order, show_workspace = [], RobotScene.show_workspace
-
-    def shown(scene, solid):
-        show_workspace(scene, solid)
-        order.append("scene")
-
-    monkeypatch.setattr(RobotScene, "show_workspace", shown)
+    order = []
+    monkeypatch.setattr(RobotScene, "show_workspace", lambda *_: order.append("scene"))
     alone.answered.subscribe(lambda: order.append("numbers"))
     alone.live.changed.subscribe(lambda: order.append("size"))
     await drag(alone, THERE)
@@ -159,13 +162,12 @@ async def test_the_scene_comes_before_the_page(alone, monkeypatch):
 
 @pytest.mark.parametrize(("late", "p_W"), [(0.01, THERE), (1e3, FARTHER)])
 async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are_late(
-    held, user, monkeypatch, late, p_W
+    user, bench, monkeypatch, late, p_W
 ):
     monkeypatch.setattr(sessions, "LATE", late)
-    bench, said, held_up = held.bench, [], threading.Event()
+    said, held_up, before = [], threading.Event(), bench.answer
     bench.results.changed.subscribe(lambda: said.append(bench.results.differs(POSE_NUMBERS)))
     bench.calculator.submit(held_up.wait)  # as while a kernel is compiled
-    before = bench.answer
     with user:
         signs = list(ElementFilter(marker="busy"))
     try:

@@ -152,20 +152,21 @@ async def test_name_state_and_fingerprint_follow_the_robot(user, bench):
     assert subject(user)[1] == "edited, not saved"
     bench.robot.undo()
     assert subject(user)[1] == "saved"
-    bench.open("planar")
+    bench.take_opened(bench.files.open("planar"))
     assert subject(user)[:2] == ("planar", "of the package")
 
 
 async def test_what_an_import_assumed_stays_as_a_card_until_it_is_seen(user, bench, tmp_path):
     caspr(tmp_path)
     assert not shown(user, "assumed")
-    opened = bench.upload({path.name: path.read_bytes() for path in tmp_path.glob("*.xml")})
+    opened = bench.files.upload({path.name: path.read_bytes() for path in tmp_path.glob("*.xml")})
+    bench.take_opened(opened)
     assert any(line.startswith("assumed ") for line in opened.notes)
     assert shown(user, "assumed")
     assert bench.assumed == opened.notes
     bench.save("toy.yaml", overwrite=False)
     assert bench.assumed == opened.notes
-    bench.open("planar")
+    bench.take_opened(bench.files.open("planar"))
     assert not shown(user, "assumed")
     bench.robot.undo()
     assert shown(user, "assumed")
@@ -192,7 +193,7 @@ async def test_a_robot_is_opened_saved_and_opened_again(user, bench, work):
     text = bench.robot.text
     type_into(user, f"cell-{CASE}", "-0.37")
     user.find(marker="save").click()
-    await until(lambda: bench.robot.text != text and bench.is_saved)
+    await until(lambda: bench.robot.text != text and bench.state == "saved")
     assert (work / "mine.yaml").read_text() == bench.robot.text != text
     user.find(marker="open").click()
     await until(lambda: shown(user, "open-robot"))

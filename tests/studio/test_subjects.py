@@ -105,7 +105,7 @@ async def test_a_result_is_marked_when_the_robot_or_the_pose_has_changed(
     assert f"of {ROBOT} as it was before" in said(user, name)
     bench.robot.undo()
     assert said(user, name) == ""
-    bench.open(OTHER)
+    bench.take_opened(bench.files.open(OTHER))
     assert f"of {ROBOT}, not of {OTHER}" in said(user, name)
     bench.robot.undo()
     assert said(user, name) == ""
@@ -143,7 +143,7 @@ async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, b
 
 async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, bench):
     open_panel(user, "run")
-    bench.open(OTHER)
+    bench.take_opened(bench.files.open(OTHER))
     await run(user, bench)
     for _ in range(2):
         await until(lambda: bench.drawn is not None)
@@ -168,7 +168,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     await until(lambda: board.draft.settings() == ())
     says = lambda words: words in field(user, "run-robot").text  # noqa: E731
     await until(lambda: says(f"Runs {ROBOT}, the robot that is open."))
-    bench.open("acrobot_large")
+    bench.take_opened(bench.files.open("acrobot_large"))
     await until(lambda: board.draft.settings() == ("robot=acrobot_large",))
     assert board.draft.check().robot == "acrobot_large"
     await until(lambda: says(f"instead of the scenario's {ROBOT}"))
