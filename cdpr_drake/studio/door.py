@@ -65,8 +65,8 @@ class Door:
             app: What is guarded.
             host: Name or address at which it listens.
             token: What is asked for; empty: nothing, but sessions are told by cookies all the same.
-            port: Its port, part of the cookie's name, since cookies know no ports.
-            bench: Returns the workbench of a session, which the application gets with the request.
+            port: Part of the cookie's name, since cookies know no ports.
+            bench: The workbench of a session, which the application gets with the request.
         """
         self._app, self._host, self._token, self._bench = app, host.lower(), token, bench
         self._name = f"cdpr_studio_{port}"

@@ -2,8 +2,8 @@
 
 The panel that is shown is part of the page. What panels import takes longer than all else of a
 start, so the others come behind it: once the browser is there, their modules are imported in the
-calculator's thread, before it computes anything, and they are placed one after the other. A tab
-that is opened before says that it is loaded, and is the next one.
+calculator's thread, before it computes anything, and they are placed one after the other, the tab
+that was opened meanwhile first.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ def _press(bench: Workbench, event: events.KeyEventArguments) -> None:
 
 def _place_panels(bench: Workbench, tabs: ui.tabs) -> None:
     """Places the panel that was shown last, and the others once the browser is there."""
-    client, loaded, waiting = ui.context.client, asyncio.Event(), dict[str, ui.tab_panel]()
+    client, waiting = ui.context.client, dict[str, ui.tab_panel]()
     shown = bench.panel if bench.panel in PANELS else next(iter(PANELS))
 
     def place(name: str) -> None:
@@ -145,15 +145,12 @@ def _place_panels(bench: Workbench, tabs: ui.tabs) -> None:
             _ = bench.scene_address  # the robot is drawn there before anything is known of it
             bench.ask()
             await asyncio.wrap_future(future)
-            loaded.set()
-            for name in PANELS:
+            for name in (bench.panel, *PANELS):
                 place(name)
                 await asyncio.sleep(BETWEEN)
 
-    async def turn_to() -> None:
+    def turn_to() -> None:
         bench.panel = str(pages.value)
-        await loaded.wait()
-        place(bench.panel)
 
     with ui.tab_panels(tabs, value=shown, animated=False, on_change=turn_to) as pages:
         pages.classes("studio-panels")

@@ -32,13 +32,10 @@ class Panel:
     """A panel of the page.
 
     Attributes:
-        title: On its tab.
         icon: Name of a Material icon.
-        place: Its function that places the elements into the current slot, for a workbench, as
-            `module:function`; the module is imported behind the page.
-        results: Titles of the results that it shows, by name. The panel tells `Workbench.results`
-            what each is about; the page says above the panel which are about something else than
-            what is open.
+        place: `module:function` that places the elements for a workbench; imported behind the page.
+        results: Titles of the results that it shows, by name. It tells `Workbench.results` what
+            each is about; the page says above it which are about something else than what is open.
     """
 
     title: str

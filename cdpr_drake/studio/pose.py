@@ -141,12 +141,7 @@ def _shown(value: float) -> str:
 
 
 def answer_html(answer: PoseAnswer, name: str) -> str:
-    """All numbers at a pose as HTML.
-
-    Args:
-        answer: What is known there.
-        name: By which the robot is asked for on the command line; empty: it is in no file.
-    """
+    """All numbers at a pose; commands know the robot by a name, empty: it is in no file."""
     rest, tensions = answer.rest, answer.why_no_tensions or f"{answer.status}, by {answer.method}"
     near = f", {answer.nearest}" if answer.nearest else ""
     angles = np.degrees(angles_from_rotation(answer.X_WP.rotation()))

@@ -47,7 +47,6 @@ class RobotQuestions:
     angles, R = Rx(φ) Ry(θ) Rz(ψ); in a plane or on a line those of its joint, along its axes.
 
     Attributes:
-        robot: The robot.
         subject: The robot as what results are about.
         axes: What each coordinate is.
     """
@@ -115,13 +114,11 @@ class PoseAnswer:
     """A robot at a pose; what cannot be had is None, and a line says why.
 
     Attributes:
-        subject: What this is about.
         tensions: As `cdpr tension` prints them, shape (m,) [N]; NaN where there are none.
         slack: True for cables without tension, shape (m,).
         status: Verdict on the tensions; empty without any.
         why_no_tensions: Why there are no tensions; empty: there are, or `status` says it.
         rest: Answer of `solve_static`.
-        why_no_rest: Why it is None.
         lengths: Of the straight paths between exit and anchor points over pulleys, shape (m,) [m].
         capacity_margin: As `cdpr workspace --measure capacity-margin` [N].
         why_no_margin: Why it is None; empty: it is not finite, or there is one.
@@ -133,14 +130,7 @@ class PoseAnswer:
         self, about: RobotQuestions, X_WP: RigidTransform, method: str = USUAL_METHOD,
         reference: float | None = None,
     ) -> None:  # fmt: skip
-        """Computes it.
-
-        Args:
-            about: The robot.
-            X_WP: The pose.
-            method: A name of `tensions.METHODS`.
-            reference: Desired tension of all cables [N], for methods that need one.
-        """
+        """Computes it; some methods of `tensions.METHODS` need a desired tension [N]."""
         from cdpr_drake.analyses.statics.static import solve_static
         from cdpr_drake.analyses.tensions import solve_tensions
         from cdpr_drake.analyses.workspaces.conditions import MEASURES, Poses

@@ -18,10 +18,6 @@ from pydrake.math import RigidTransform
 from cdpr_drake.geometry.poses import pose_row
 from cdpr_drake.models.robot_schema import Robot
 
-FINGERPRINT = 8
-"""Digits of a digest that are shown; two of a thousand robots share them about once in 10,000."""
-
-
 CLOCK = 0.02
 """What an event loop may be early [s]."""
 
@@ -60,8 +56,8 @@ class Subject:
 
     @property
     def fingerprint(self) -> str:
-        """Short form of the digest, by which a robot as it was is told; empty: not known."""
-        return self.digest[:FINGERPRINT]
+        """Eight digits of the digest, which two of a thousand robots share once in 10,000."""
+        return self.digest[:8]
 
     def is_another(self, now: Subject) -> bool:
         """Whether it is known to be about another robot, or the robot as it was before."""
@@ -79,10 +75,9 @@ def subject_of(robot: Robot) -> Subject:
 
 
 class Results:
-    """The results that a session's panels show, by name, each with what it is about.
+    """What the results that a session's panels show are about, by the name of the result.
 
-    Attributes:
-        changed: Called when a result, the robot or the pose has changed.
+    `changed` tells when a result, the robot or the pose has changed.
     """
 
     def __init__(self, now: Callable[[], Subject]) -> None:
@@ -92,10 +87,7 @@ class Results:
         self._awaited: dict[str, float] = {}  # until when
 
     def wait_for(self, name: str, longest: float) -> None:
-        """Says nothing of a result that is about something else: the next one comes at once.
-
-        That holds for so long [s].
-        """
+        """Says nothing of a result that is about something else for so long [s]: one comes."""
         self._awaited[name] = monotonic() + longest
         asyncio.get_running_loop().call_later(longest + CLOCK, self.changed.emit)
 
@@ -110,9 +102,6 @@ class Results:
         return self._subjects.get(name)
 
     def differs(self, name: str) -> str:
-        """By what a result is about something else than what is open; empty: it is not.
-
-        Empty, too, as long as the next result is waited for.
-        """
+        """By what a result is about something else; empty: it is not, or one is waited for."""
         subject, waits = self.subject(name), monotonic() < self._awaited.get(name, 0.0)
         return "" if subject is None or waits else subject.differs(self._now())

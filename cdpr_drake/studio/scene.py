@@ -70,13 +70,7 @@ class RobotScene:
         self._dark, self._solids = False, ""
 
     def show(self, robot: Robot, X_WP: RigidTransform, tensions: Array) -> None:
-        """Draws a robot at a pose.
-
-        Args:
-            robot: The robot.
-            X_WP: Pose of the platform [m].
-            tensions: Shape (m,) [N]; a slack cable is red, one with NaN grey.
-        """
+        """Draws a robot at a pose, with tensions, shape (m,) [N]: slack is red, NaN is grey."""
         if robot is not self._robot:
             self._place(robot)
         self._picture.draw(X_WP, tensions)

@@ -54,18 +54,14 @@ class Workbench:
     """What one browser session works on; its tabs show the same.
 
     Attributes:
-        robot: The robot's document.
         coordinates: Of the platform's pose, as `RobotQuestions` has them [m, deg].
-        X_WP: The pose.
         method: How tensions are distributed, a name of `tensions.METHODS`.
         reference: Desired tension for methods that need one [N].
         answer: What is known about the robot at a pose; None: nothing yet.
         problem: Why there is no answer, which is a mistake of this program; None: there is one.
-        answered: Called when there is another answer or problem.
         is_computing: True until what was asked last is answered.
         is_dragged: True while a point of the robot is in a hand.
         scenario: Name or path of the scenario that is worked with; empty: none was chosen.
-        panel: Name of the panel that was shown last.
         dark: Whether the page is dark; None: as the browser likes it.
         drawn: What the scene shows in the place of the robot; None: the robot.
     """
@@ -184,16 +180,10 @@ class Workbench:
         self.robot.belongs_to(path)
 
     def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
-        """Moves a point of a cable: for the numbers only, or in the document when it is let go.
+        """Moves the exit or anchor point of a cable to p_W, shape (3,) [m].
 
-        Args:
-            kind: `exit` or `anchor`.
-            number: Number of the cable.
-            p_W: Where it is, shape (3,) [m].
-            done: Whether it was let go.
-
-        Returns:
-            Why it cannot be there, once it is let go; empty: it can.
+        That is for the numbers only, or in the document once it is let go (`done`). Returns why it
+        cannot be there; empty: it can.
         """
         self.is_dragged = not done
         robot = copy.deepcopy(self.robot.value)
@@ -202,7 +192,7 @@ class Workbench:
         p = np.round(p, 4) + 0.0
         try:
             if done:
-                place = ("cables", number, name)
+                place = "cables", number, name
                 self.robot.change(with_value(self.robot.text, place, p.tolist()))
             else:
                 setattr(cable, name, p)
@@ -221,23 +211,22 @@ class Workbench:
         self.ask()
 
     def _is_outside(self) -> bool:
-        """Whether the platform is where the robot as it is now cannot be."""
-        robot, p = self.questions.robot, self.X_WP.translation()
-        lower, upper = robot.frame.bounds()
-        near = robot.joint().nearest(self.X_WP)
-        outside = np.any((p < lower) | (p > upper))
-        return bool(outside) or not near.IsNearlyEqualTo(self.X_WP, 1e-6)
+        p, (lower, upper) = self.X_WP.translation(), self.questions.robot.frame.bounds()
+        return bool(np.any((p < lower) | (p > upper)))
+
+    @property
+    def X_WP(self) -> RigidTransform:
+        """The pose of the platform."""
+        return self.questions.pose(self.coordinates)
 
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""
-        self.X_WP: RigidTransform = self.questions.robot.home.transform()
-        self.coordinates = self.questions.coordinates(self.X_WP)
+        self.coordinates = self.questions.coordinates(self.questions.robot.home.transform())
 
     def move_to(self, coordinates: Sequence[float]) -> None:
         """Moves the platform to coordinates, as `RobotQuestions` has them, and asks there."""
         self.is_dragged = False  # also where a browser went away with a point in its hand
         self.coordinates = [float(value) for value in coordinates]
-        self.X_WP = self.questions.pose(self.coordinates)
         self.ask()
 
     def ask(self) -> None:
@@ -312,8 +301,7 @@ class Workbench:
     def scene_address(self) -> Future[str]:
         """Path of the socket behind which the scene is; the server relays it to the page.
 
-        The robot is drawn there first, with grey cables: what is known of it may have to wait for
-        kernels that are compiled.
+        The robot is drawn there first, with grey cables: kernels may have to be compiled.
         """
         robot, X_WP = self.questions.robot, self.X_WP
 
