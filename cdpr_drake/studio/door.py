@@ -19,8 +19,6 @@ import re
 import secrets
 import socket
 from collections.abc import Awaitable, Callable
-from html import escape
-from urllib.parse import quote, urlencode
 from weakref import WeakValueDictionary
 
 from itsdangerous import Signer
@@ -51,8 +49,8 @@ _PLACE = re.compile(r"(?:\[([0-9a-f:.]{2,60})\]|([a-z0-9](?:[a-z0-9._-]{0,252}))
 class Door:
     """An ASGI application before another one.
 
-    starlette's `TrustedHostMiddleware` would not do: it has no words for who is refused, takes the
-    first of two hosts, and cannot accept every address where the studio listens at all of them.
+    starlette's `TrustedHostMiddleware` has no words for who is refused, takes the first of two
+    hosts, and cannot accept every address where the studio listens at all of them.
     """
 
     def __init__(
@@ -88,7 +86,7 @@ class Door:
         """What is answered in the application's place; None: it may answer."""
         session, words, status = self._session(request), self._refusal(request), 403
         if not words and self._hands_cookie(request, session):
-            return self._cookie_page(request, session)
+            return self._cookie_page(session)
         if not words and session:
             try:
                 request.scope[BENCH] = await self._bench(session)
@@ -133,29 +131,21 @@ class Door:
             return name in (socket.gethostname().lower(), socket.getfqdn().lower())
 
     def _hands_cookie(self, request: HTTPConnection, session: str) -> bool:
-        """Whether a request is answered with a cookie, or with an address without the token."""
+        """Whether a request is answered with a cookie, or with the address without the token."""
         scope, query = request.scope, request.query_params
-        if scope["type"] != "http" or scope["method"] != "GET":
+        if (scope["type"], scope.get("method"), scope["path"]) != ("http", "GET", "/"):
             return False
-        if self._token:
-            return TOKEN in query
-        return not session and scope["path"] == "/" and ASKED not in query
+        return TOKEN in query if self._token else not session and ASKED not in query
 
-    def _cookie_page(self, request: HTTPConnection, session: str) -> HTMLResponse:
+    def _cookie_page(self, session: str) -> HTMLResponse:
         """A page that goes on by itself to the address without the token, with a cookie.
 
         No redirection: a browser that comes from another site keeps SameSite=Strict cookies back.
         """
-        left = [x for x in request.query_params.multi_items() if x[0] not in (TOKEN, ASKED)]
-        if not self._token:
-            left.append((ASKED, "set"))
-        # One slash at the start, or it would be the name of another machine.
-        path = quote("/" + request.scope["path"].lstrip("/\\"), errors="replace")
-        shown = escape(f"{path}?{urlencode(left)}" if left else path)
+        home = "/" if self._token else f"/?{ASKED}=set"
         page = HTMLResponse(
             '<!doctype html><meta charset="utf-8"><title>cdpr studio</title>'
-            f'<meta http-equiv="refresh" content="0;url={shown}">'
-            f'<a href="{shown}">cdpr studio</a>\n',
+            f'<meta http-equiv="refresh" content="0;url={home}"><a href="{home}">cdpr studio</a>\n',
             headers={"referrer-policy": "no-referrer", **NO_STORE},
         )
         if not session:
@@ -188,6 +178,3 @@ class Sessions:
         if len(self._latest) > MOST_SESSIONS:
             del self._latest[next(iter(self._latest))]
         return bench
-
-    def __len__(self) -> int:
-        return len(self._benches)
