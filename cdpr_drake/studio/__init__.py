@@ -14,8 +14,8 @@ and `commands` are the panels.
   shows what they leave in a folder (`VerbBoard`); four of the panels are one each.
 * `PoseAnswer` is what is computed at the pose, by the verbs; `LiveWorkspace` the static workspace
   that follows a robot while it is changed. `RobotScene` draws both; `dragging.js` moves points.
-* `Calculator` is the one thread that has kernels and Meshcat, so that a page never waits for a
-  compiler; of several questions it answers the last.
+* `Workbench.calculator` is the one thread that has kernels and Meshcat, so that a page never waits
+  for a compiler; of several questions it answers the last.
 * `Subject` is the robot and pose that a result is about; the page says above each panel what is
   about another one.
 * `View` shows what any command left: numbers, verdicts, tables, figures, pages, files. `RunWatch`

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from nicegui import Event
@@ -18,10 +18,9 @@ from nicegui import Event
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator
 
 if TYPE_CHECKING:  # what computes is imported at the first sketch
-    from cdpr_drake.studio.scene import RobotScene
+    from cdpr_drake.studio.scene import Draw, RobotScene
     from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
     from cdpr_drake.workspaces.volume import WorkspaceVolume
 
@@ -104,9 +103,9 @@ class LiveWorkspace:
         changed: Called when any of these has changed.
     """
 
-    def __init__(self, calculator: Calculator, scene: Callable[[], RobotScene]) -> None:
-        """With the calculator and the scene, which is asked for in its thread only."""
-        self._calculator, self._scene = calculator, scene
+    def __init__(self, draw: Callable[[Draw, Callable[[Any], None]], None]) -> None:
+        """With `draw` of a workbench."""
+        self._draw = draw
         self.sketch: WorkspaceSketch | None = None
         self.is_wanted, self.changed = True, Event[[]]()
         self._robot: Robot | None = None
@@ -132,10 +131,10 @@ class LiveWorkspace:
         elif drawn is None or drawn.robot is not robot or drawn.poses < poses:
             self._drawn = sketch_workspace(robot, poses)
 
-    def draw(self, poses: int = COARSE) -> None:
+    def draw(self, scene: RobotScene, poses: int = COARSE) -> None:
         """Draws it on a grid of about so many poses, or more; in the calculator's thread."""
         self.compute(poses)
-        self._scene().show_workspace(None if self._drawn is None else self._drawn.solid)
+        scene.show_workspace(None if self._drawn is None else self._drawn.solid)
 
     def take(self) -> None:
         """Tells what was drawn, and refines it after a rest; in the thread of the page."""
@@ -148,4 +147,4 @@ class LiveWorkspace:
                 self._refining = loop.call_later(REST, self._redraw, FINE)
 
     def _redraw(self, poses: int) -> None:
-        self._calculator.run(lambda: self.draw(poses), lambda _: self.take())
+        self._draw(lambda scene: self.draw(scene, poses), lambda _: self.take())

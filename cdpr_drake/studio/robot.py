@@ -6,7 +6,6 @@ import asyncio
 import io
 import zipfile
 from collections.abc import Awaitable, Callable
-from concurrent.futures import Future
 from functools import partial
 from html import escape
 from typing import Any
@@ -201,7 +200,7 @@ def place_beside(bench: Workbench) -> None:
             table.content = ""
             return
 
-        def show(future: Future[list[Pair]]) -> None:
+        def show(future: asyncio.Future[list[Pair]]) -> None:
             with table, show_errors():
                 pairs = future.result()
                 if name == str(other.value) and one is bench.robot.value:
@@ -211,7 +210,7 @@ def place_beside(bench: Workbench) -> None:
             opened = bench.files.open(name)
             return robots_side_by_side(one, bench.files.read(opened.text, opened.path))
 
-        bench.calculator.run(work, show)
+        bench.calculate(work, show)
 
     fold.on_value_change(unfold).mark("robot-beside")
     other.on_value_change(compare)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from asyncio import Future
 from collections.abc import Mapping
-from concurrent.futures import Future
 from time import monotonic
 from typing import Any
 

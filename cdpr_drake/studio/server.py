@@ -7,6 +7,7 @@ import re
 import secrets
 import socket
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from pathlib import Path
 
@@ -19,7 +20,6 @@ from starlette.requests import HTTPConnection
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
-from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.door import BENCH, TOKEN, Door, Sessions
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
@@ -80,7 +80,7 @@ def serve(
             "accepted: with an address of this machine alone, such as 127.0.0.1"
         )
     robot, scenario = _opened(opened)
-    work, jobs, calculator = WorkingFolder(folder), JobManager(), Calculator()
+    work, jobs, calculator = WorkingFolder(folder), JobManager(), ThreadPoolExecutor(1)
 
     def make() -> Workbench:
         return Workbench(work, robot, scenario, calculator=calculator, jobs=jobs, commands=commands)
@@ -106,7 +106,7 @@ def serve(
 
     async def end() -> None:
         await jobs.close()
-        calculator.close()
+        calculator.shutdown(cancel_futures=True)
 
     app.on_startup(lambda: background_tasks.create(announce(), name="announce"))
     app.on_shutdown(end)

@@ -1,11 +1,16 @@
-"""What one browser session works on: a robot, its file, a pose, and what is known there."""
+"""What one browser session works on: a robot, its file, a pose, and what is known there.
+
+Kernels are compiled under one lock, a minute long at the first use, and Drake's Meshcat takes calls
+only from the thread that made it. All of that happens in one thread, that of the `calculator`, so
+that the server's, which answers pages, never waits for it.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,7 +25,6 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
@@ -68,7 +72,7 @@ class Workbench:
 
     def __init__(
         self, folder: WorkingFolder, robot: str = USUAL_ROBOT, scenario: str = "", *,
-        calculator: Calculator | None = None, jobs: JobManager | None = None,
+        calculator: ThreadPoolExecutor | None = None, jobs: JobManager | None = None,
         commands: Callable[[], Mapping[str, Verb]] = dict,
     ) -> None:  # fmt: skip
         """With a robot of the package or the path of a file, and perhaps a scenario.
@@ -79,7 +83,7 @@ class Workbench:
             CdprError: There is no such robot, or it is not accepted.
         """
         self.folder, self.scenario, self.panel = folder, scenario, ""
-        self.calculator = calculator or Calculator()
+        self.calculator = calculator or ThreadPoolExecutor(1)
         self.jobs = JobManager() if jobs is None else jobs
         self._make_commands = commands
         self._kept: dict[Any, Any] = {}
@@ -106,7 +110,7 @@ class Workbench:
         self._question: Callable[[], PoseAnswer] | None = None
         self._telling: asyncio.TimerHandle | None = None
         self._scene: RobotScene | None = None
-        self.live = LiveWorkspace(self.calculator, self.scene)
+        self.live = LiveWorkspace(self.draw)
         self.questions = RobotQuestions(self.robot.value)
         self.go_home()
         self.robot.changed.subscribe(lambda: self._take(self.robot.value))
@@ -243,7 +247,7 @@ class Workbench:
         self.is_computing = question is not None
         if question is not None:
             self.results.wait_for(POSE_NUMBERS, LATE)
-            self.calculator.run(question, self._answer_came)
+            self.calculate(question, self._answer_came)
 
     def _answer(
         self, questions: RobotQuestions, X_WP: RigidTransform, method: str, reference: float | None
@@ -257,10 +261,10 @@ class Workbench:
             # All is computed before: what comes to the browser at once is one picture, not two.
             self.live.compute()
             self.scene().show(questions.robot, X_WP, tensions)
-            self.live.draw()
+            self.live.draw(self.scene())
         return answer
 
-    def _answer_came(self, future: Future[PoseAnswer]) -> None:
+    def _answer_came(self, future: asyncio.Future[PoseAnswer]) -> None:
         self._go_on()
         self.problem = future.exception()
         if self.problem is None:
@@ -285,9 +289,17 @@ class Workbench:
             self.drawn = subject
             self.results.changed.emit()
 
-    def draw(self, draw: Draw, done: Callable[[Future[Any]], Any] | None = None) -> None:
-        """Draws into the scene, in the calculator's thread; `done` as for `Calculator.run`."""
-        self.calculator.run(lambda: draw(self.scene()), done)
+    def draw(self, draw: Draw, done: Callable[[asyncio.Future[Any]], Any] | None = None) -> None:
+        """Draws into the scene, see `calculate`."""
+        self.calculate(lambda: draw(self.scene()), done)
+
+    def calculate(
+        self, work: Callable[[], T], done: Callable[[asyncio.Future[T]], Any] | None = None
+    ) -> None:
+        """Works in the calculator's thread; `done` gets the future in the event loop."""
+        future = asyncio.get_running_loop().run_in_executor(self.calculator, work)
+        if done is not None:  # the server is not ending
+            future.add_done_callback(lambda future: future.cancelled() or done(future))
 
     def scene(self) -> RobotScene:
         """The scene, made at the first call; for the calculator's thread only."""

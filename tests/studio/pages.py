@@ -1,13 +1,13 @@
 """The studio's page without a browser: NiceGUI's simulated user, and no plugin of pytest."""
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, contextmanager
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
 
 from cdpr_drake.cli.studio import verbs
-from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
@@ -30,7 +30,7 @@ async def simulated(root):
 @asynccontextmanager
 async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, their workbench and client."""
-    calculator = Calculator()
+    calculator = ThreadPoolExecutor(1)
     folder = WorkingFolder(folder)
     bench = Workbench(folder, robot, calculator=calculator, commands=verbs)
     try:
@@ -38,7 +38,7 @@ async def opened_page(folder, robot="acrobot_large"):
             await until(lambda: not _loading(user))
             yield user, bench, user.client
     finally:
-        calculator.close()
+        calculator.shutdown(cancel_futures=True)
 
 
 class HeldPage:

@@ -1,6 +1,7 @@
 """The static workspace that follows a robot while it is changed, and points that are dragged."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -24,9 +25,8 @@ THERE, FARTHER = np.array([-0.4, -0.5, 1.1]), np.array([-0.3, -0.5, 1.1])
 
 @pytest.fixture(scope="module")
 def calculator():
-    made = sessions.Calculator()
-    yield made
-    made.close()
+    with ThreadPoolExecutor(1) as made:
+        yield made
 
 
 @pytest.fixture

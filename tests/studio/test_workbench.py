@@ -1,5 +1,6 @@
 """Documents, folder and poses of a workbench, without a page."""
 
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 from unittest.mock import Mock
 
@@ -8,7 +9,6 @@ import pytest
 
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_names
-from cdpr_drake.studio.calculator import Calculator
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.pose import answer_html
 from cdpr_drake.studio.pose_answer import PoseAnswer, RobotQuestions
@@ -28,9 +28,8 @@ APART = 2.0 / 300.0
 
 @pytest.fixture(scope="module")
 def calculator():
-    made = Calculator()
-    yield made
-    made.close()
+    with ThreadPoolExecutor(1) as made:
+        yield made
 
 
 @pytest.fixture
