@@ -15,7 +15,6 @@ from nicegui import events, ui
 from pydantic import BaseModel, FiniteFloat, NonNegativeInt, ValidationError
 
 from cdpr_drake.studio.live_workspace import FINE, LiveWorkspace
-from cdpr_drake.studio.panel import notify
 from cdpr_drake.studio.pose_answer import PoseAnswer
 from cdpr_drake.studio.session import Workbench
 
@@ -47,9 +46,7 @@ def add_point_dragging(bench: Workbench) -> None:
         with suppress(ValidationError):  # the script says no such thing
             point = _Moved.model_validate(event.args)
             if point.number < len(bench.robot.value.cables):
-                words = bench.drag_point(point.kind, point.number, np.array(point.at), point.done)
-                if words:
-                    notify(words)
+                bench.drag_point(point.kind, point.number, np.array(point.at), point.done)
 
     ui.on(MOVED, moved)
     client = ui.context.client

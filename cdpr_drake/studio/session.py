@@ -183,11 +183,13 @@ class Workbench:
         self._opened[path] = OpenedRobot(text, path, self.assumed, self.folder.shown(path))
         self.robot.belongs_to(path)
 
-    def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> str:
+    def drag_point(self, kind: str, number: int, p_W: Array, done: bool) -> None:
         """Moves the exit or anchor point of a cable to p_W, shape (3,) [m].
 
-        That is for the numbers only, or in the document once it is let go (`done`). Returns why it
-        cannot be there; empty: it can.
+        That is for the numbers only, or in the document once it is let go (`done`).
+
+        Raises:
+            CdprError: It cannot be there.
         """
         self.is_dragged = not done
         robot = copy.deepcopy(self.robot.value)
@@ -203,8 +205,7 @@ class Workbench:
                 self._take(robot)
         except CdprError as problem:
             self._take(self.robot.value)
-            return "\n".join(self.robot.words(problem))
-        return ""
+            raise CdprError("\n".join(self.robot.words(problem))) from problem
 
     def _take(self, robot: Robot) -> None:
         """Asks about another robot, or the same one after a change."""
