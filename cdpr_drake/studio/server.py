@@ -90,13 +90,12 @@ def serve(
     name, bound = (socket.gethostname(), "0.0.0.0") if is_everywhere else (host, host)
     port = _free_port(bound, port)
     address = f"http://{f'[{name}]' if ':' in name else name}:{port}/"
-    said, secret = f"{address} , with the token that was set", token
+    secret = secrets.token_urlsafe(32) if token is None else token
+    page = said = f"{address}?{TOKEN}={secret}" if secret else address
     if token == "":
-        said = f"{address} , without a token: every program and user of this machine may open it"
-    elif token is None:
-        secret = secrets.token_urlsafe(32)
-        said = f"{address}?{TOKEN}={secret}"
-    page = f"{address}?{TOKEN}={secret}" if secret else address
+        said += " , without a token: every program and user of this machine may open it"
+    elif token is not None:
+        said = f"{address} , with the token that was set"
 
     async def announce() -> None:
         while not Server.instance.started:  # the port is open only then

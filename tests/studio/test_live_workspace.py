@@ -2,6 +2,7 @@
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -184,3 +185,15 @@ async def test_the_page_is_busy_at_once_and_calls_numbers_old_only_when_they_are
     assert not any(sign.visible for sign in signs)
     assert not bench.results.differs(POSE_NUMBERS)
     assert any(said) == (late < 1.0)
+
+
+async def test_what_a_handler_raises_is_said_and_a_mistake_is_logged(
+    user, bench, monkeypatch, caplog
+):
+    problems = [CdprError("refused"), ValueError("odd")]
+    monkeypatch.setattr(bench, "go_home", Mock(side_effect=problems))
+    for number in (1, 2):
+        user.find(marker="home").click()
+        await until(lambda number=number: len(user.notify.messages) == number)
+    assert user.notify.messages == ["refused", "ValueError: odd"]
+    assert [record.msg for record in caplog.records] == problems[1:]
