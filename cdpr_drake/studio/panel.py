@@ -80,14 +80,16 @@ def _place_remark(bench: Workbench, name: str, title: str) -> None:
         differs.classes("studio-kept")
 
     def refresh() -> None:
+        # Nothing is set twice: a browser builds the page anew for each change of an element.
         words, subject = results.differs(name), results.subject(name)
         differs.text = f"{title}: {words}." if words else ""
-        print_.text = ""
-        differs.classes(remove="studio-soft")
-        if subject is not None and not subject.robot:  # nothing to be warned of
-            differs.classes("studio-soft")
-        elif subject is not None and subject.digest and not is_pose:
-            print_.text = f"{title}: {subject.robot}, {subject.fingerprint}"
+        is_own = subject is not None and not subject.robot  # nothing to be warned of
+        differs.classes(add="studio-soft" if is_own else "", remove="" if is_own else "studio-soft")
+        print_.text = (
+            f"{title}: {subject.robot}, {subject.fingerprint}"
+            if subject is not None and subject.digest and not is_pose
+            else ""
+        )
 
     refresh()
     results.changed.subscribe(refresh)
