@@ -15,7 +15,6 @@ from nicegui import events, ui
 from pydantic import BaseModel, FiniteFloat, NonNegativeInt, ValidationError
 
 from cdpr_drake.studio.live_workspace import FINE, LiveWorkspace
-from cdpr_drake.studio.pose_answer import PoseAnswer
 from cdpr_drake.studio.session import Workbench
 
 SCRIPT = files("cdpr_drake.studio").joinpath("dragging.js").read_text(encoding="utf-8")
@@ -84,9 +83,7 @@ def live_workspace_bar(bench: Workbench) -> None:
 
     def refresh() -> None:
         switch.value = bench.live.is_wanted
-        size.text, pull.text = size_words(bench.live), "tensions at this pose: computing"
-        if bench.answer is not None or bench.problem is not None:
-            pull.text = tension_words(bench.answer) if bench.answer is not None else ""
+        size.text, pull.text = size_words(bench.live), tension_words(bench)
 
     refresh()
     switch.on_value_change(choose)
@@ -111,8 +108,11 @@ def size_words(live: LiveWorkspace) -> str:
     )
 
 
-def tension_words(answer: PoseAnswer) -> str:
+def tension_words(bench: Workbench) -> str:
     """Least and largest tension at the pose, and what is wrong with them."""
+    answer = bench.answer
+    if answer is None:
+        return "" if bench.problem is not None else "tensions at this pose: computing"
     tensions, cables = answer.tensions, answer.robot.cables
     if not np.any(np.isfinite(tensions)):
         return f"tensions at this pose: {answer.why_no_tensions or answer.status or 'none'}"
