@@ -197,3 +197,9 @@ async def test_what_a_handler_raises_is_said_and_a_mistake_is_logged(
         await until(lambda number=number: len(user.notify.messages) == number)
     assert user.notify.messages == ["refused", "ValueError: odd"]
     assert [record.msg for record in caplog.records] == problems[1:]
+
+
+async def test_sliders_and_their_fields_follow_the_pose(user, bench):
+    bench.move_to([0.1, *bench.coordinates[1:]])
+    await until(lambda: field(user, "slider-0").value == 0.1)
+    assert field(user, "coordinate-0").value == "0.1"
