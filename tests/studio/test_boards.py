@@ -8,7 +8,7 @@ import pytest
 
 from cdpr_drake.cli.studio import verbs
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.boards import VerbBoard, VerbJob
+from cdpr_drake.studio.boards import Board
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
 from tests.studio.pages import until
@@ -42,7 +42,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
 ):
     monkeypatch.setattr(Job, "program", (sys.executable, "-c", STEADY))
     jobs, folder = JobManager(), WorkingFolder(tmp_path)
-    board = VerbBoard(jobs, tmp_path, "workspaces", VerbJob)
+    board = Board(jobs, tmp_path, "workspaces")
     about, words = {"robot": "acrobot_small", "digest": "x"}, ["workspace", "--robot=planar"]
     first = await board.start(every["workspace"], words, "some", about)
     assert jobs.free_folder(first.folder).name == "some-2"
@@ -57,7 +57,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert board.choices()["some"].job is first
     await jobs.close()
     jobs = JobManager()  # as when the server was started anew
-    board = VerbBoard(jobs, tmp_path, "workspaces", VerbJob)
+    board = Board(jobs, tmp_path, "workspaces")
     await until(lambda: board.choices())
     there = board.shown_entry()
     assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
@@ -91,7 +91,7 @@ async def test_what_leaves_no_folder_leaves_nothing_and_own_numbers_stay(
     tmp_path, monkeypatch, every, program, files
 ):
     monkeypatch.setattr(Job, "program", (sys.executable, "-c", program))
-    board = VerbBoard(JobManager(), tmp_path, "workspaces", VerbJob)
+    board = Board(JobManager(), tmp_path, "workspaces")
     job = await board.start(every["workspace"], ["workspace", "--robot=planar"], "some", {})
     assert await job.wait(LONGEST)
     asked = board.folder / ".some.asked.json"
@@ -122,7 +122,7 @@ async def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, monkeypatch, 
     (tmp_path / "studies" / "some").mkdir(parents=True)
     (tmp_path / "studies" / ".some.asked.json").write_text(json.dumps({"words": words}))
     jobs, offered = JobManager(), {name: every[name] for name in ("workspace", "study")}
-    board = VerbBoard(jobs, tmp_path, "studies", VerbJob)
+    board = Board(jobs, tmp_path, "studies")
     await until(board.choices)
     if runs:
         await board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
@@ -134,7 +134,7 @@ async def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, monkeypatch, 
 
 
 async def test_a_board_lists_finished_folders_the_newest_first_and_no_links(tmp_path):
-    board = VerbBoard(JobManager(), tmp_path, "studies", VerbJob)
+    board = Board(JobManager(), tmp_path, "studies")
     assert board.choices() == {}
     for time, name in enumerate(("c", "b", "a")):
         (tmp_path / "studies" / name).mkdir(parents=True)

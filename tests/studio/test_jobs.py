@@ -18,7 +18,7 @@ LONGEST = 1200.0
 
 def toy(code, folder):
     """A program of a few lines in the place of `cdpr`."""
-    job = Job("toy", [code], folder)
+    job = Job([code], folder)
     job.program = (sys.executable, "-c")
     return job
 

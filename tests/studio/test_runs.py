@@ -17,10 +17,9 @@ from cdpr_drake.studio import runs
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager, JobState
 from cdpr_drake.studio.plots import plot_row
-from cdpr_drake.studio.run import _boards, run_panel
-from cdpr_drake.studio.runs import RunJob, read_run
+from cdpr_drake.studio.run import run_pairs, run_panel
+from cdpr_drake.studio.runs import FinishedRun, RunBoard, RunJob
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.watch import run_pairs
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.studio.conftest import RUN_SETTINGS
 from tests.studio.pages import field, problems, shown, simulated, type_into, until
@@ -66,7 +65,7 @@ async def test_a_run_that_is_watched_paused_and_stepped_has_the_same_log(tmp_pat
 
 
 def test_rows_are_those_of_the_log(alone):
-    done = read_run(alone)
+    done = FinishedRun(alone)
     with np.load(alone / "log.npz") as log:
         assert done.times.tolist() == log["time"].tolist()
         last = done.samples[-1]
@@ -81,15 +80,14 @@ def test_rows_are_those_of_the_log(alone):
     row = plot_row(last)
     assert len(row) == 1 + sum(len(chart.series) for chart in done.charts)
     assert row[1] == pytest.approx(1e3 * last["position_error"])
-    assert done.charts[1].plain()["limits"] == load_robot("acrobot_small").tension_limits()
+    assert done.charts[1].limits == load_robot("acrobot_small").tension_limits()
 
 
 def test_a_folder_without_a_log_is_no_run_and_a_broken_one_is_refused(alone, tmp_path):
-    assert read_run(tmp_path) is None
     broken = shutil.copytree(alone, tmp_path / "broken")
     (broken / "log.npz").write_bytes(b"PK no archive")
     with pytest.raises(OutputFolderError, match="broken: cannot be read"):
-        read_run(broken)
+        FinishedRun(broken)
 
 
 def test_a_run_beside_another_has_numbers_of_both(alone):
@@ -201,7 +199,7 @@ async def test_buttons_break_and_push_and_the_scenario_keeps_it(
     field(user, "paused").value = field(user, "by-hand").value = True
     await press(user, "start")
     await until(lambda: shown(user, "break") and field(user, "break").enabled, LONGEST)
-    job = _boards[bench].choices()[_boards[bench].shown].job
+    job = bench.kept(RunBoard).choices()[bench.kept(RunBoard).shown].job
     await until(lambda: field(user, "hand-cable").options)
     field(user, "hand-cable").value = 2
     await press(user, "break")
