@@ -42,7 +42,7 @@ a graphics card the scene takes most of its time."""
 SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
 
-NOTHING, READING = "none", "reading the log"
+READING = "reading the log"
 
 EMPTY = (
     "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "
@@ -66,9 +66,6 @@ DIRECTIONS = {
     for k, axis in enumerate("xyz") for sign, factor in (("+", 1.0), ("-", -1.0))
 }  # fmt: skip
 """Directions of a push in W."""
-
-USUAL_FORCE, USUAL_TIME = 5.0, 0.3
-"""Of a push [N], [s]."""
 
 OF_THE_PROGRAM = ("versions", "wall_time_s", "realtime_factor")
 """Keys of a summary that say nothing about the run."""
@@ -95,7 +92,7 @@ class RunPanel:
         self.entry: Entry | None = None
         self.run: RunJob | FinishedRun = NO_RUN
         self.other: FinishedRun | None = None
-        self._is_unreadable = False
+        self._unreadable: set[Path] = set()  # folders
         # What the browser has.
         self._begun: tuple[object, tuple[Chart, ...], object] = NO_RUN, (), None
         self._sample: Sample | None = None
@@ -120,6 +117,19 @@ class RunPanel:
         """The job of the run, as long as the server has it."""
         job = self.entry and self.entry.job
         return job if isinstance(job, RunJob) else NO_RUN
+
+    @property
+    def state(self) -> str:
+        """How the run is, in a few words; empty: none is shown."""
+        job = self.job
+        if job is not NO_RUN:
+            starts = job.state == JobState.RUNNING and not job.header
+            return "starting" if starts else job.state.value
+        if isinstance(self.run, FinishedRun):
+            return "finished"
+        if self.entry is None:
+            return ""
+        return "unreadable" if self.entry.folder in self._unreadable else READING
 
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
@@ -148,17 +158,18 @@ class RunPanel:
             speed.props("dense outlined").classes("cdpr-speed").mark("speed")
             speed.on_value_change(lambda: self.job.tell("speed", factor=SPEEDS[board.speed]))
             for words, (icon, act, takes) in STEERING.items():
-                button = self._button("", icon, act, takes)
-                button.props(f'dense aria-label="{words}" title="{words}"')
+                props = f'dense aria-label="{words}" title="{words}"'
+                button = self._button("", icon, props, act, takes)
                 button.mark(words.lower().replace(" ", "-"))
         empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
         empty.bind_visibility_from(board, "shown", lambda key: not key)
 
     def _button(
-        self, words: str, icon: str, act: Callable[[RunJob], None], takes: Callable[[RunJob], bool]
-    ) -> ui.button:
+        self, words: str, icon: str, props: str, act: Callable[[RunJob], None],
+        takes: Callable[[RunJob], bool],
+    ) -> ui.button:  # fmt: skip
         """A button that does something to a run that works, as long as that takes it."""
-        button = ui.button(words, icon=icon, on_click=lambda: act(self.job))
+        button = ui.button(words, icon=icon, on_click=lambda: act(self.job)).props(props)
         return button.bind_enabled_from(
             self, "job", lambda job: job.state in WORKING and takes(job)
         )
@@ -173,29 +184,27 @@ class RunPanel:
             peak = float(force.value or 0.0) * DIRECTIONS[str(direction.value)]
             job.tell(PUSH, force=peak.tolist(), seconds=float(time.value or 0.0))
 
-        def takes(act: str) -> Callable[[RunJob], bool]:
-            return lambda job: act in job.header.get("takes", ())
+        def hand(act: str, icon: str, title: str, do: Callable[[RunJob], None]) -> None:
+            props, words = f'no-caps outline title="{title}"', act.capitalize()
+            button = self._button(words, icon, props, do, lambda job: act in job.takes)
+            button.mark(act)
 
         with ui.element("div").classes("w-full") as box:
             with ui.row().classes("w-full items-center"):
                 self._cable = ui.select({}, label="cable").mark("hand-cable")
-                button = self._button("Break", "content_cut", break_cable, takes(BREAK))
-                button.props('title="The cable pulls no more from now on"').mark("break")
+                hand(BREAK, "content_cut", "The cable pulls no more from now on", break_cable)
                 direction = ui.select([*DIRECTIONS], value="+x", label="direction in W")
-                force = ui.number("force", value=USUAL_FORCE, min=0.0, suffix="N")
-                time = ui.number("for", value=USUAL_TIME, min=0.0, step=0.1, suffix="s")
-                hit = self._button("Push", "touch_app", push, takes(PUSH))
-                hit.props('title="A push at Po, a half sine with this peak force"').mark("push")
+                force = ui.number("force", value=5.0, min=0.0, suffix="N").mark("push-force")
+                time = ui.number("for", value=0.3, min=0.0, step=0.1, suffix="s").mark("push-time")
+                hand(PUSH, "touch_app", "A push at Po, a half sine with this peak force", push)
             done = ui.label().classes("cdpr-soft").props('role="status"').mark("hand-done")
-        for made in (button, hit):
-            made.props("no-caps outline")
+        direction.classes("w-32").mark("push-direction")
         for field in (self._cable, direction, force, time):
             field.props("dense outlined")
-        direction.classes("w-32").mark("push-direction")
-        force.classes("w-24").mark("push-force")
-        time.classes("w-24").mark("push-time")
+        for number in (force, time):
+            number.classes("w-24")
         done.bind_text_from(self, "job", _done_by_hand)
-        box.bind_visibility_from(self, "job", lambda job: bool(job.header.get("takes")))
+        box.bind_visibility_from(self, "job", lambda job: bool(job.takes))
 
     def _place_state(self) -> None:
         """Places the camera's image, and how the run is."""
@@ -203,16 +212,25 @@ class RunPanel:
             with ui.element("figure").classes("cdpr-camera") as figure:
                 self._image = ui.element("img").props('alt="Image of the camera"').mark("camera")
             with ui.element("div").classes("cdpr-run-state"):
-                self._state = ui.label().classes("cdpr-state").props('role="status"')
-                self._state.mark("run-state")
-                self._outcome = ui.label().classes("cdpr-outcome").mark("outcome")
+                state = ui.label().classes("cdpr-state").props('role="status"').mark("run-state")
+                outcome = ui.label().classes("cdpr-outcome").mark("outcome")
                 self._bar = ui.linear_progress(0.0, show_value=False)
-                self._words = ui.label().classes("cdpr-soft").mark("run-words")
-                self._problem = ui.label().classes("studio-problem").mark("run-problem")
+                words = ui.label().classes("cdpr-soft").mark("run-words")
+                problem = ui.label().classes("studio-problem").mark("run-problem")
                 key = ui.label("Image: detected marks are orange, desired marks green.")
                 key.classes("cdpr-soft")
         for element in (figure, key):
             element.bind_visibility_from(self, "_jpeg", bool)
+        state.bind_text_from(self, "state")
+        outcome.bind_text_from(self, "run", lambda shown: shown.outcome.replace("_", " "))
+        self._bar.bind_value_from(self, "job", lambda job: job.progress[0] or 0.0)
+        self._bar.bind_visibility_from(
+            self, "state", lambda state: state == READING or not self.job.state.is_over
+        )
+        words.bind_text_from(self, "job", lambda job: job.message or job.progress[1])
+        problem.bind_text_from(words, "text")
+        words.bind_visibility_from(self, "state", lambda state: state != JobState.FAILED)
+        problem.bind_visibility_from(self, "state", lambda state: state == JobState.FAILED)
 
     def _place_plots(self) -> None:
         """Places plots over time, and a slider for the time of a finished run."""
@@ -233,9 +251,9 @@ class RunPanel:
         self._fold.classes("w-full studio-group").mark("run-results")
         self._fold.on_value_change(self._fill_results)
         with ui.row().classes("w-full items-center"):
-            self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
-            self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
-            self._compare.on_value_change(self._choose_other)
+            self._compare = ui.select({}, label="compare with").mark("compare")
+            self._compare.props("dense outlined").classes("cdpr-compare")
+            self._compare.bind_value_to(self._board, "compared", lambda key: key or "")
             span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
             span.on_value_change(
                 lambda: self._plots.run_method("show_span", SPANS[str(span.value)])
@@ -328,9 +346,6 @@ class RunPanel:
             self._board.shown, self._board.cursor = str(self._run.value), None
             self._refresh()
 
-    def _choose_other(self) -> None:
-        self._board.compared = "" if self._compare.value == NOTHING else str(self._compare.value)
-
     def _recover(self) -> None:
         """Writes results of a run that was killed, as far as it was simulated."""
         with show_errors():
@@ -348,7 +363,7 @@ class RunPanel:
 
     def _tick(self) -> None:
         """Shows what is new; many times a second."""
-        shown, scene, is_live = self.run, self._board.scene, isinstance(self.run, RunJob)
+        shown, board, is_live = self.run, self._board, isinstance(self.run, RunJob)
         with show_errors():
             if self._begun != (shown, shown.charts, self.other):
                 self._begin()
@@ -359,11 +374,10 @@ class RunPanel:
                     self._plots.put(new)
                 self._look()
             if self._bench.panel not in ("", "run"):
-                scene.give_back()
+                board.give_back()
             elif shown.scenario is not None and self._sample is not None:
                 wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE) if is_live else 0.0
-                scene.draw(shown, self._sample, wait)
-            self._say()
+                board.draw(shown, self._sample, wait)
 
     def _begin(self) -> None:
         """Shows all that is there, as after a change, or in a browser that shows it anew."""
@@ -390,85 +404,58 @@ class RunPanel:
             self._plots.run_method("cursor", sample["t"])
         self._sample = sample
 
-    def _say(self) -> None:
-        """State, outcome and progress in words."""
-        job = self.job
-        fraction, words = job.progress
-        if job is not NO_RUN:
-            starts = job.state == JobState.RUNNING and not job.header
-            state = "starting" if starts else job.state.value
-            words = job.message or words
-        elif isinstance(self.run, FinishedRun):
-            state = "finished"
-        else:
-            state = "unreadable" if self._is_unreadable else READING if self.entry else ""
-        failed = state == JobState.FAILED
-        self._state.text, self._outcome.text = state, self.run.outcome.replace("_", " ")
-        self._words.text, self._problem.text = ("", words) if failed else (words, "")
-        self._problem.visible = failed
-        self._bar.visible = state == READING or not job.state.is_over
-        self._bar.value = fraction or 0.0
-        if self._bar.props.get("indeterminate", False) != (fraction is None):
-            self._bar.props.set_bool("indeterminate", fraction is None)
-
     async def _slow_tick(self) -> None:
         with show_errors():
-            choices = self._refresh()
-            await self._read()
-            await self._read_other(choices.get(self._board.compared))
+            other = self._refresh()
+            if other is None or self.other is None or other.folder != self.other.folder:
+                self.other = await self._read(other)
+            entry, board = self.entry, self._board
+            if self.job.state.is_over and not isinstance(self.run, FinishedRun):
+                done = await self._read(entry)
+                if done is not None and _identity(entry) == _identity(self.entry):
+                    self.run = done
+                    board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
+                    self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
             self._bench.results.show(RUN, self.run.subject)
             self._bench.results.show(COMPARED, self.other.subject if self.other else None)
 
-    def _refresh(self) -> dict[str, Entry]:
-        """Offers the runs that there are, and shows the one that the session looks at."""
+    async def _read(self, entry: Entry | None) -> FinishedRun | None:
+        """What a run left; None: nothing, or what cannot be read, which is said once."""
+        if entry is None or not entry.is_whole or entry.folder in self._unreadable:
+            return None
+        try:
+            return await run.io_bound(FinishedRun, entry.folder)
+        except Exception:
+            self._unreadable.add(entry.folder)
+            raise
+
+    def _refresh(self) -> Entry | None:
+        """Offers what runs there are, and shows the one looked at; returns the one behind it."""
         board, choices = self._board, self._board.choices()
         if board.shown not in choices:
             board.shown = next((key for key, entry in choices.items() if entry.job), "")
         if board.compared == board.shown:
             board.compared = ""
         _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
-        others = {NOTHING: NOTHING} | {
+        others = {"": "none"} | {
             key: entry.folder.name for key, entry in choices.items()
             if key != board.shown and (entry.job is None or entry.job.state == JobState.FINISHED)
         }  # fmt: skip
-        _offer(self._compare, others, board.compared if board.compared in others else NOTHING)
+        _offer(self._compare, others, board.compared if board.compared in others else "")
         before, self.entry = self.entry, choices.get(board.shown)
         if _identity(before) != _identity(self.entry):
-            self.run, self._is_unreadable, self._fold.value = self.job, False, False
+            self.run, self._fold.value = self.job, False
+            self._unreadable.clear()
             self._results.clear()
         broken = {event.get("cable") for event in self.job.events}
         names = enumerate(self.job.header.get("cables", ()))
         left = {k: name for k, name in names if k not in broken}
         value = self._cable.value if self._cable.value in left else next(iter(left), None)
+        is_endless = self.job.progress[0] is None
+        if is_endless != self._bar.props.get("indeterminate", False):
+            self._bar.props.set_bool("indeterminate", is_endless)
         _offer(self._cable, left, value)
-        return choices
-
-    async def _read(self) -> None:
-        """Reads what the run left once it is over."""
-        entry, board = self.entry, self._board
-        is_read = self._is_unreadable or isinstance(self.run, FinishedRun)
-        if entry is None or is_read or not entry.is_whole or not self.job.state.is_over:
-            return
-        try:
-            done = await run.io_bound(FinishedRun, entry.folder)
-        except Exception:
-            self._is_unreadable = True
-            raise
-        if done is not None and _identity(entry) == _identity(self.entry):
-            self.run = done
-            board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
-            self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
-
-    async def _read_other(self, entry: Entry | None) -> None:
-        """Reads the run that is shown behind this one."""
-        before = None if self.other is None else self.other.folder
-        folder = entry.folder if entry is not None and entry.is_whole else None
-        if folder != before:
-            try:
-                self.other = None if folder is None else await run.io_bound(FinishedRun, folder)
-            except Exception:
-                self._board.compared = ""
-                raise
+        return choices.get(board.compared)
 
 
 def run_pairs(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Pair]:

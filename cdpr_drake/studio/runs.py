@@ -1,4 +1,4 @@
-"""Runs as a page shows them, live (`RunJob`) or finished (`FinishedRun`) alike; board and scene.
+"""Runs as a page shows them, live (`RunJob`) or finished (`FinishedRun`) alike, and their board.
 
 Both have `scenario`, and its robot as `subject`; `charts`, the time `end` [s], and `samples` as in
 `analyses.runs.steering`; `outcome` (running, converged, ...); and `at(time)`.
@@ -97,6 +97,11 @@ class RunJob(Job):
         self.pace: dict[str, Any] = {"paused": paused, "speed": speed}
         self._image, self._count, self._stride = b"", 0, 1
         self._connection: Connection | None = None
+
+    @property
+    def takes(self) -> Sequence[str]:
+        """What can be done to it by hand, once it has said so."""
+        return self.header.get("takes", ())
 
     @property
     def outcome(self) -> str:
@@ -254,64 +259,6 @@ class FinishedRun:
         return self.samples[row], self._drawn[1]
 
 
-class RunScene:
-    """Draws runs into a workbench's scene while the run panel is shown.
-
-    Attributes:
-        sample: The sample of a run that is there, or on its way; None: the open robot is there.
-    """
-
-    def __init__(self, bench: Workbench) -> None:
-        """Without a run."""
-        self._bench = bench
-        self.sample: Sample | None = None
-        self._busy, self._drawn = False, 0.0
-        # Of the calculator's thread: the robot of a scenario.
-        self._scenario: Any = None
-        self._picture: RobotPicture
-
-    def draw(self, run: RunJob | FinishedRun, sample: Sample, wait: float) -> None:
-        """Draws a sample of a run, unless it is there, or one was drawn less than `wait` before [s]
-        or is being drawn; to be called again and again."""
-        if sample is self.sample or self._busy or monotonic() - self._drawn < wait:
-            return
-        bench, dark = self._bench, bool(self._bench.dark)
-        self.sample, self._busy = sample, True
-
-        def done(future: Future[None]) -> None:
-            self._busy, self._drawn = False, monotonic()
-            if future.exception() is None and self.sample is not None:
-                bench.draws(run.subject)
-
-        bench.draw(lambda scene: self._draw(scene, run.scenario, sample, dark), done)
-
-    def give_back(self) -> None:
-        """Lets the open robot be shown again."""
-        if self.sample is not None:
-            self.sample = None
-            self._bench.draw(self._leave)
-            self._bench.draws(None)
-            self._bench.ask()
-
-    def _leave(self, scene: RobotScene) -> None:
-        self._scenario = None
-        scene.redraw()
-
-    def _draw(self, scene: RobotScene, scenario: Any, sample: Sample, dark: bool) -> None:
-        if scenario is not self._scenario:
-            for path in PATHS:
-                scene.meshcat.Delete(path)
-            self._scenario, self._picture = scenario, _picture(scene, scenario)
-            scene.set_dark(dark)
-        unstrained = sample["unstrained"]
-        self._picture.draw(
-            pose_from_row(np.array(sample["pose"], float)),
-            np.array(sample["tensions"], float),  # None becomes NaN
-            float(sample["t"]),
-            None if unstrained is None else np.array(unstrained, float),
-        )
-
-
 def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
     """The robot of a scenario and all that is round it."""
     robot = load_robot(scenario.robot)
@@ -328,23 +275,28 @@ def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
 
 
 class RunBoard(Board):
-    """What the run panel of a session shows; all its tabs show the same.
+    """What the run panel of a session shows, in all its tabs and in its scene.
 
     Attributes:
-        scene: Draws the run that is shown.
         draft: The scenario that is worked on; None: none was chosen.
         compared: Key of the run behind the one that is shown; empty: none.
         speed: Speed of the next run, a name of `SPEEDS`.
         cursor: Time that is looked at in a finished run [s]; None: its end.
+        in_scene: The sample of a run that is in the scene, or on its way; None: the open robot is.
     """
 
     def __init__(self, bench: Workbench) -> None:
-        """Of a workbench, whose jobs are those of the server."""
+        """Of a workbench, without a run in its scene."""
         super().__init__(bench.jobs, bench.folder.root, RUNS)
-        self.scene = RunScene(bench)
+        self._bench = bench
         self.draft: ScenarioDraft | None = None
         self.compared, self.speed = "", "real time"
         self.cursor: float | None = None
+        self.in_scene: Sample | None = None
+        self._draws, self._drawn = False, 0.0
+        # Of the calculator's thread: the robot of a scenario.
+        self._scenario: Any = None
+        self._picture: RobotPicture
 
     def is_whole(self, folder: Path) -> bool:
         """True if a folder has the results of a run."""
@@ -375,3 +327,44 @@ class RunBoard(Board):
         )  # fmt: skip
         job.scenario, job.subject = scenario, subject_of(load_robot(scenario.robot))
         return job
+
+    def draw(self, run: RunJob | FinishedRun, sample: Sample, wait: float) -> None:
+        """Draws a sample of a run, unless it is there, or one was drawn less than `wait` before [s]
+        or is being drawn; to be called again and again."""
+        if sample is self.in_scene or self._draws or monotonic() - self._drawn < wait:
+            return
+        bench, dark = self._bench, bool(self._bench.dark)
+        self.in_scene, self._draws = sample, True
+
+        def done(future: Future[None]) -> None:
+            self._draws, self._drawn = False, monotonic()
+            if future.exception() is None and self.in_scene is not None:
+                bench.draws(run.subject)
+
+        bench.draw(lambda scene: self._draw(scene, run.scenario, sample, dark), done)
+
+    def give_back(self) -> None:
+        """Lets the open robot be shown again."""
+        if self.in_scene is not None:
+            self.in_scene = None
+            self._bench.draw(self._leave)
+            self._bench.draws(None)
+            self._bench.ask()
+
+    def _leave(self, scene: RobotScene) -> None:
+        self._scenario = None
+        scene.redraw()
+
+    def _draw(self, scene: RobotScene, scenario: Any, sample: Sample, dark: bool) -> None:
+        if scenario is not self._scenario:
+            for path in PATHS:
+                scene.meshcat.Delete(path)
+            self._scenario, self._picture = scenario, _picture(scene, scenario)
+            scene.set_dark(dark)
+        unstrained = sample["unstrained"]
+        self._picture.draw(
+            pose_from_row(np.array(sample["pose"], float)),
+            np.array(sample["tensions"], float),  # None becomes NaN
+            float(sample["t"]),
+            None if unstrained is None else np.array(unstrained, float),
+        )

@@ -150,7 +150,7 @@ async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, 
         assert bench.drawn.robot == ROBOT
         open_panel(user, "robot")
         await until(lambda: bench.drawn is None)
-        assert bench.kept(RunBoard).scene.sample is None
+        assert bench.kept(RunBoard).in_scene is None
         open_panel(user, "run")
     await until(lambda: bench.drawn is not None)
     open_panel(user, "robot")
