@@ -12,6 +12,9 @@ from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
 
+LONGEST = 1200.0
+"""Nothing here takes as long, unless it hangs [s]."""
+
 
 @asynccontextmanager
 async def simulated(root):
