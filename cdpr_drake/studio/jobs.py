@@ -163,11 +163,20 @@ class Job:
         with ExitStack() as stack:
             files = [await asyncio.to_thread(tempfile.TemporaryFile) for _ in range(2)]
             out, err = (stack.enter_context(file).fileno() for file in files)
-            theirs, self._lifeline = os.pipe()  # which no other child inherits
+            # See `cli.process.exit_with_parent`; no other child inherits it.
+            theirs, self._lifeline = os.pipe()
             stack.callback(os.close, self._lifeline)
             self.descriptors += (theirs,)
+            own = {
+                "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
+                PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(theirs),
+            }  # fmt: skip
             try:
-                process = self._process = await self._start(out, err, theirs)
+                process = self._process = await asyncio.create_subprocess_exec(
+                    *self.program, *self.arguments, cwd=self.working, env=os.environ | own,
+                    stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
+                    pass_fds=self.descriptors, start_new_session=True,
+                )  # fmt: skip
             except (OSError, ValueError) as problem:
                 self.set_state(JobState.FAILED, f"cannot be started: {problem}")
                 return
@@ -186,18 +195,6 @@ class Job:
                     await process.wait()
             self._output = os.pread(out, LARGEST_OUTPUT, 0)
         self._end(process.returncode)
-
-    async def _start(self, out: int, err: int, lifeline: int) -> asyncio.subprocess.Process:
-        """Starts the process with its files and the pipe of `cli.process.exit_with_parent`."""
-        own = {
-            "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
-            PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(lifeline),
-        }  # fmt: skip
-        return await asyncio.create_subprocess_exec(
-            *self.program, *self.arguments, cwd=self.working, env=os.environ | own,
-            stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
-            pass_fds=self.descriptors, start_new_session=True,
-        )  # fmt: skip
 
     def _hear(self, err: int) -> None:
         """Takes what was said, the newest of it where it is much."""

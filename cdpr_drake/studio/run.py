@@ -437,10 +437,8 @@ class RunPanel:
         if board.compared == board.shown:
             board.compared = ""
         _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
-        others = {"": "none"} | {
-            key: entry.folder.name for key, entry in choices.items()
-            if key != board.shown and (entry.job is None or entry.job.state == JobState.FINISHED)
-        }  # fmt: skip
+        whole = [key for key, entry in choices.items() if entry.is_whole and key != board.shown]
+        others = {"": "none"} | {key: key for key in whole}
         _offer(self._compare, others, board.compared if board.compared in others else "")
         before, self.entry = self.entry, choices.get(board.shown)
         if _identity(before) != _identity(self.entry):

@@ -1,7 +1,7 @@
 """The studio's page without a browser: NiceGUI's simulated user, and no plugin of pytest."""
 
 import asyncio
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
@@ -34,11 +34,10 @@ async def simulated(root):
 async def opened_page(folder, robot="acrobot_large"):
     """A user who has opened the page, their workbench and client."""
     calculator = Calculator()
-    folder = WorkingFolder(folder)
-    bench = Workbench(folder, robot, calculator=calculator, commands=verbs)
+    bench = Workbench(WorkingFolder(folder), robot, calculator=calculator, commands=verbs)
     try:
         async with simulated(make_page(lambda _: bench)) as user:
-            await until(lambda: not _loading(user))
+            await until(lambda: not shown(user, "panel-loading"))
             yield user, bench, user.client
     finally:
         calculator.close()
@@ -79,22 +78,6 @@ class HeldPage:
                     asked[1].set_result(await asked[0])
                 except BaseException as problem:
                     asked[1].set_exception(problem)
-
-
-@contextmanager
-def held_page(folder, robot):
-    """A page for several tests, see `HeldPage`."""
-    held = HeldPage(folder, robot)
-    try:
-        yield held
-    finally:
-        held.close()
-
-
-def _loading(user):
-    """Whether panels are still to come."""
-    with user:
-        return bool(list(ElementFilter(marker="panel-loading")))
 
 
 async def settled(bench):
