@@ -253,7 +253,7 @@ class RunPanel:
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({}, label="compare with").mark("compare")
             self._compare.props("dense outlined").classes("cdpr-compare")
-            self._compare.bind_value_to(self._board, "compared", lambda key: key or "")
+            self._compare.on_value_change(self._choose_other)
             span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
             span.on_value_change(
                 lambda: self._plots.run_method("show_span", SPANS[str(span.value)])
@@ -345,6 +345,9 @@ class RunPanel:
         if self._run.value and self._run.value != self._board.shown:
             self._board.shown, self._board.cursor = str(self._run.value), None
             self._refresh()
+
+    def _choose_other(self) -> None:
+        self._board.compared = str(self._compare.value or "")
 
     def _recover(self) -> None:
         """Writes results of a run that was killed, as far as it was simulated."""

@@ -168,6 +168,8 @@ async def test_a_finished_run_is_looked_at_compared_and_downloaded(tmp_path, alo
         assert compare.value == ""
         compare.value = "first"
         await until(lambda: shown(user, "both-runs"))
+        await user.open("/")  # anew
+        await until(lambda: shown(user, "both-runs"))
         await press(user, "download")
         data = await user.download.next(timeout=LONGEST)
     with zipfile.ZipFile(io.BytesIO(data.content)) as archive:
