@@ -205,8 +205,8 @@ class Job:
 
     def _end(self, code: int) -> None:
         """Says how it ended, by its exit code."""
-        done, last = code in (0, INCOMPLETE, CLIENT_ENDED), self.lines[-1] if self.lines else ""
-        if done:
+        last = self.lines[-1] if self.lines else ""
+        if code in (0, INCOMPLETE, CLIENT_ENDED):
             self.progress = (1.0, "")
             self.set_state(JobState.FINISHED, reason(self.lines, code) if code and last else "")
         elif self._wish is not None:

@@ -146,7 +146,7 @@ class RunPanel:
             self._which = ui.label().classes("studio-soft").mark("run-robot")
             self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
             self._own.props("dense no-caps outline")
-            self._own.visible = False  # until the scenario says of which robot it is
+            self._own.bind_visibility_from(self._own, "text", bool)
 
     def _place_choice(self) -> None:
         """Places which run is shown, its speed, and pause, go, step and stop."""
@@ -245,18 +245,16 @@ class RunPanel:
         """Places the numbers of both runs, what is in the folder, and what is done with it."""
         with ui.expansion("Both runs in numbers").classes("w-full studio-group") as self._both:
             self._pairs = ui.html("", sanitize=False).classes("w-full").mark("run-pairs")
-        with ui.expansion("Results, figures and files") as self._fold:
+        self._fold = ui.expansion("Results, figures and files", on_value_change=self._fill_results)
+        with self._fold.classes("w-full studio-group").mark("run-results"):
             self._results = ui.element("div").classes("w-full")
         self._both.mark("both-runs")
-        self._fold.classes("w-full studio-group").mark("run-results")
-        self._fold.on_value_change(self._fill_results)
         with ui.row().classes("w-full items-center"):
-            self._compare = ui.select({}, label="compare with").mark("compare")
-            self._compare.props("dense outlined").classes("cdpr-compare")
-            self._compare.on_value_change(self._choose_other)
-            span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
+            self._compare = ui.select({}, label="compare with", on_change=self._choose_other)
+            self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
+            span = ui.select([*SPANS], value="all", label="time shown").props("dense outlined")
             span.on_value_change(
-                lambda: self._plots.run_method("show_span", SPANS[str(span.value)])
+                lambda event: self._plots.run_method("show_span", SPANS[event.value])
             )
             ui.space()
             recover = ui.button("Write the results so far", on_click=self._recover)
@@ -320,8 +318,7 @@ class RunPanel:
             words += "." if is_own else f", instead of the scenario's {own}."
         except CdprError as problem:
             words, fits = f"Nothing can be started: {problem}.", False
-        self._which.text, self._own.text = words, f"Open {own}"
-        self._own.visible = not is_own
+        self._which.text, self._own.text = words, "" if is_own else f"Open {own}"
         return fits
 
     async def _open_own_robot(self) -> None:
