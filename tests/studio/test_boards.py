@@ -36,12 +36,7 @@ if (folder / "kept").exists():
 time.sleep(3600)
 """
 
-WORDS = ["workspace", "--robot=planar"]
-
-
-@pytest.fixture(scope="module")
-def every():
-    return verbs()
+WORDS, VERBS = ["workspace", "--robot=planar"], verbs()
 
 
 @pytest.fixture
@@ -54,17 +49,17 @@ def program(monkeypatch, code):
 
 
 async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_folder(
-    tmp_path, monkeypatch, every, board
+    tmp_path, monkeypatch, board
 ):
     program(monkeypatch, STEADY)
     folder, about = WorkingFolder(tmp_path), {"robot": "acrobot_small", "digest": "x"}
-    first = await board.start(every["workspace"], WORDS, "some", about)
+    first = await board.start(VERBS["workspace"], WORDS, "some", about)
     assert board._jobs.free_folder(first.folder).name == "some-2"
     await until(lambda: first.progress[0] is not None)  # it listens to SIGTERM then
     there = board.shown_entry()
     assert (there.name, there.job) == ("some, running", first)
     with pytest.raises(CdprError, match="it works"):
-        await board.go_on(there, every, folder)
+        await board.go_on(there, VERBS, folder)
     first.stop()
     assert await first.wait(LONGEST)
     await until(lambda: board.choices()["some"].asked)
@@ -75,7 +70,7 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
     assert there.about == about
     assert (there.digest("acrobot_small"), there.digest("planar")) == ("x", "")
-    second = await board.go_on(there, every, folder)
+    second = await board.go_on(there, VERBS, folder)
     assert await second.wait(LONGEST)
     assert (second.state, second.arguments) == ("finished", first.arguments)
     assert second.folder == first.folder
@@ -89,10 +84,10 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     ("code", "files"), [("raise SystemExit(2)", {}), (OWN, {"results.json": "own"})]
 )
 async def test_what_leaves_no_folder_leaves_nothing_and_own_numbers_stay(
-    monkeypatch, every, board, code, files
+    monkeypatch, board, code, files
 ):
     program(monkeypatch, code)
-    job = await board.start(every["workspace"], WORDS, "some", {})
+    job = await board.start(VERBS["workspace"], WORDS, "some", {})
     assert await job.wait(LONGEST)
     asked = board.folder / ".some.asked.json"
     await until(lambda: not asked.exists() or json.loads(asked.read_text())["words"] == [])
@@ -117,13 +112,11 @@ async def test_what_leaves_no_folder_leaves_nothing_and_own_numbers_stay(
         (["study", "case-9"] + ["--quick"] * 20_000, False),
     ],
 )  # fmt: skip
-async def test_a_file_asks_for_no_more_than_a_page_would(
-    tmp_path, monkeypatch, every, board, words, runs
-):
+async def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, monkeypatch, board, words, runs):
     program(monkeypatch, "")
     (board.folder / "some").mkdir(parents=True)
     (board.folder / ".some.asked.json").write_text(json.dumps({"words": words}))
-    offered = {name: every[name] for name in ("workspace", "study")}
+    offered = {name: VERBS[name] for name in ("workspace", "study")}
     await until(board.choices)
     try:
         await board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
@@ -134,11 +127,12 @@ async def test_a_file_asks_for_no_more_than_a_page_would(
 
 
 async def test_a_board_lists_finished_folders_the_newest_first_and_no_links(board):
+    assert board.choices() == {}
+    await until(lambda: not board._looks)
     for time, name in enumerate(("c", "b", "a")):
         (board.folder / name).mkdir(parents=True)
         (board.folder / name / ("results.json" if name != "b" else "x")).write_text("{}")
         os.utime(board.folder / name, (time, time))
     (board.folder / "link").symlink_to(board.folder / "a")
-    assert board.choices() == {}
-    await until(board.choices)
+    await until(lambda: len(board.choices()) > 1)
     assert list(board.choices()) == ["a", "c"]
