@@ -389,8 +389,8 @@ class RunPanel:
         self._both.visible = False
         if isinstance(shown, FinishedRun) and other is not None:
             self._both.visible = True
-            pairs = run_pairs(shown.summary, other.summary)
-            self._pairs.content = pair_table(pairs, shown.folder.name, other.folder.name)
+            both = run_pairs(shown.summary, other.summary)
+            self._pairs.content = pair_table(both, shown.folder.name, other.folder.name)
         self._look()
 
     def _look(self) -> None:
@@ -449,10 +449,10 @@ class RunPanel:
         names = enumerate(self.job.header.get("cables", ()))
         left = {k: name for k, name in names if k not in broken}
         value = self._cable.value if self._cable.value in left else next(iter(left), None)
+        _offer(self._cable, left, value)
         is_endless = self.job.progress[0] is None
         if is_endless != self._bar.props.get("indeterminate", False):
             self._bar.props.set_bool("indeterminate", is_endless)
-        _offer(self._cable, left, value)
         return choices.get(board.compared)
 
 
