@@ -154,7 +154,7 @@ from pathlib import Path
 from cdpr_drake.studio.jobs import Job
 
 async def main():
-    job = Job("a job", sys.argv[2:], Path.cwd())
+    job = Job(sys.argv[2:], Path.cwd())
     job.begin()
     while job._process is None:
         await asyncio.sleep(0.01)

@@ -11,14 +11,14 @@ and `commands` are the panels.
 * `Document` is a robot or scenario as a text with undo and redo, changed only by what the checks
   accept. `SettingsForm` is its form, made from the declarations of its settings.
 * `Verb` is a command as its verb declares it, `VerbForm` its form. A `VerbPanel` starts verbs and
-  shows what they leave in a folder (`VerbBoard`); four of the panels are one each.
+  shows what they leave in a folder (`Board`); four of the panels are one each.
 * `PoseAnswer` is what is computed at the pose, by the verbs; `LiveWorkspace` the static workspace
   that follows a robot while it is changed. `RobotScene` draws both; `dragging.js` moves points.
 * `Workbench.calculator` is the one thread that has kernels and Meshcat, so that a page never waits
   for a compiler; of several questions it answers the last.
 * `Subject` is the robot and pose that a result is about; the page says above each panel what is
   about another one.
-* `View` shows what any command left: numbers, verdicts, tables, figures, pages, files. `RunWatch`
+* `View` shows what any command left: numbers, verdicts, tables, figures, pages, files. `RunPanel`
   shows a run that goes on (`RunJob`) and one that is finished (`FinishedRun`) alike.
 * `Job` is any `cdpr` command in a process of its own. All sessions share the server's jobs, so that
   a reload or a second tab loses no run.

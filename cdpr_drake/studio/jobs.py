@@ -19,8 +19,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from enum import StrEnum
 from pathlib import Path
-from socket import socket
-from typing import Any, TypeVar
+from typing import Any
 
 import cdpr_drake
 from cdpr_drake.errors import CdprError
@@ -74,32 +73,32 @@ class Job:
 
     Attributes:
         program: What is run with the arguments.
-        title: What it is, in a few words.
         arguments: Of the command, from the name of the subcommand on.
         working: Folder that it is run in.
-        folder: Folder of its results; None: there is none.
+        folder: Folder of its results, by which a board finds it; None: there is none.
+        descriptors: Files that only its process will have.
         state: Its state.
         message: Why it failed, or another remark about its end, in one line; else empty.
         progress: Share of the work that is done, from 0 to 1, or None; and words about it.
         lines: What it said besides its progress, the newest lines.
         changed: Called when `state` has changed.
+        put_away: Called with it in another thread when its process has ended, or never began.
     """
 
     program: Sequence[str] = COMMAND
 
-    def __init__(
-        self, title: str, arguments: Sequence[str], working: Path, folder: Path | None = None
-    ) -> None:
+    def __init__(self, arguments: Sequence[str], working: Path, folder: Path | None = None) -> None:
         """Queued; arguments as the attributes, an option --json is up to the caller."""
-        self.title, self.arguments, self.working = title, tuple(arguments), working
-        self.folder, self.state, self.message = folder, JobState.QUEUED, ""
+        self.arguments, self.working, self.folder = tuple(arguments), working, folder
+        self.descriptors: tuple[int, ...] = ()
+        self.state, self.message = JobState.QUEUED, ""
         self.progress: tuple[float | None, str] = (None, "")
         self.lines: list[str] = []
         self.changed: Callable[[], None] = lambda: None
+        self.put_away: Callable[[Job], None] = lambda job: None
         self._output = b""
         self._process: asyncio.subprocess.Process | None = None
         self._lifeline = -1
-        self._steering: socket | None = None  # which the process alone keeps
         self._wish: signal.Signals | None = None
         self._over = asyncio.Event()
         self._started = self._ended = 0.0
@@ -124,8 +123,12 @@ class Job:
     def begin(self) -> None:
         """Starts to work; a failure of that is one of the job."""
         self._started = time.monotonic()
-        self._task = asyncio.create_task(self._work(), name=self.title)
+        self._task = asyncio.create_task(self._run())
         self.set_state(JobState.RUNNING)
+
+    async def _run(self) -> None:
+        await self._work()
+        await asyncio.to_thread(self.put_away, self)
 
     def stop(self, wish: signal.Signals = signal.SIGTERM) -> None:
         """Asks it to stop and to keep what it has; one that is queued never begins.
@@ -160,16 +163,26 @@ class Job:
         with ExitStack() as stack:
             files = [await asyncio.to_thread(tempfile.TemporaryFile) for _ in range(2)]
             out, err = (stack.enter_context(file).fileno() for file in files)
-            theirs, self._lifeline = os.pipe()  # which no other child inherits
+            # See `cli.process.exit_with_parent`; no other child inherits it.
+            theirs, self._lifeline = os.pipe()
             stack.callback(os.close, self._lifeline)
+            self.descriptors += (theirs,)
+            own = {
+                "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
+                PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(theirs),
+            }  # fmt: skip
             try:
-                process = await self._start(out, err, theirs)
+                process = self._process = await asyncio.create_subprocess_exec(
+                    *self.program, *self.arguments, cwd=self.working, env=os.environ | own,
+                    stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
+                    pass_fds=self.descriptors, start_new_session=True,
+                )  # fmt: skip
             except (OSError, ValueError) as problem:
                 self.set_state(JobState.FAILED, f"cannot be started: {problem}")
                 return
             finally:
-                os.close(theirs)
-            self._process = process
+                for descriptor in self.descriptors:
+                    os.close(descriptor)
             self._signal()
             try:
                 while process.returncode is None:
@@ -183,21 +196,6 @@ class Job:
             self._output = os.pread(out, LARGEST_OUTPUT, 0)
         self._end(process.returncode)
 
-    async def _start(self, out: int, err: int, lifeline: int) -> asyncio.subprocess.Process:
-        """Starts the process with its files and the pipe of `cli.process.exit_with_parent`."""
-        own = {
-            "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
-            PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(lifeline),
-        }  # fmt: skip
-        with self._steering or ExitStack():
-            ends = [] if self._steering is None else [self._steering.fileno()]
-            steered = [f"--steered-by={end}" for end in ends]
-            return await asyncio.create_subprocess_exec(
-                *self.program, *self.arguments, *steered, cwd=self.working, env=os.environ | own,
-                stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
-                pass_fds=(lifeline, *ends), start_new_session=True,
-            )  # fmt: skip
-
     def _hear(self, err: int) -> None:
         """Takes what was said, the newest of it where it is much."""
         tail = os.pread(err, LARGEST_TAIL, max(os.fstat(err).st_size - LARGEST_TAIL, 0))
@@ -207,8 +205,8 @@ class Job:
 
     def _end(self, code: int) -> None:
         """Says how it ended, by its exit code."""
-        done, last = code in (0, INCOMPLETE, CLIENT_ENDED), self.lines[-1] if self.lines else ""
-        if done:
+        last = self.lines[-1] if self.lines else ""
+        if code in (0, INCOMPLETE, CLIENT_ENDED):
             self.progress = (1.0, "")
             self.set_state(JobState.FINISHED, reason(self.lines, code) if code and last else "")
         elif self._wish is not None:
@@ -240,9 +238,6 @@ def _short(line: str) -> str:
     return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 4]} ..."
 
 
-J = TypeVar("J", bound=Job)
-
-
 class JobManager:
     """The jobs of a server, in the order in which they were submitted.
 
@@ -262,7 +257,7 @@ class JobManager:
         """True if a job works."""
         return self._count() > 0
 
-    def submit(self, job: J) -> J:
+    def submit(self, job: Job) -> Job:
         """Takes a job over, and begins it when there is room.
 
         Raises:

@@ -7,6 +7,7 @@ const RIGHT_AXIS = 46;
 const FONT = "11px system-ui, sans-serif";
 const MOST_POINTS = 700;
 const HEIGHT = 150;
+const DASHES = { "-": [], "--": [6, 3], "-.": [8, 3, 2, 3], ":": [2, 3] };
 
 export default {
   template: `<div class="cdpr-plots">
@@ -53,7 +54,8 @@ export default {
   },
   methods: {
     begin(charts, duration) {
-      this.charts = charts;
+      const curve = ([name, look]) => ({ name, color: look.color, dash: DASHES[look.dash] });
+      this.charts = charts.map((chart) => ({ ...chart, series: chart.series.map(curve) }));
       this.duration = duration;
       this.rows = [];
       this.others = [];

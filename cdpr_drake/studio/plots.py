@@ -16,11 +16,6 @@ from cdpr_drake.palette import ANGLE, DASHED, DISTANCE, Look, nth_look
 Row = list[float | None]
 """Time, then the curves of one chart after the other; None where there is no value."""
 
-DASHES: dict[str, tuple[float, ...]] = {
-    "-": (), "--": (6.0, 3.0), "-.": (8.0, 3.0, 2.0, 3.0), ":": (2.0, 3.0),
-}  # fmt: skip
-"""Dashes of the palette's names [px]."""
-
 LONGEST_SILENCE = 5.0
 """Time after which a browser that does not answer gets rows again [s]."""
 
@@ -31,11 +26,11 @@ fades at each answer."""
 
 @dataclass(frozen=True)
 class Chart:
-    """One plot over time.
+    """One plot over time, as the browser gets it.
 
     Attributes:
         title: What it shows, with its unit.
-        series: Names of its curves, with their looks.
+        series: Names of its curves, with their looks, whose dashes are names.
         limits: Bounds to draw, in the unit of the curves.
         right: Title of a second axis, to which the last curve belongs; empty: there is none.
     """
@@ -44,14 +39,6 @@ class Chart:
     series: tuple[tuple[str, Look], ...]
     limits: tuple[float, ...] = ()
     right: str = ""
-
-    def plain(self) -> dict[str, Any]:
-        """For JSON."""
-        series = []
-        for name, look in self.series:
-            dash = DASHES[look.dash] if isinstance(look.dash, str) else look.dash[1]
-            series.append({"name": name, "color": look.color, "dash": dash})
-        return {"title": self.title, "right": self.right, "limits": self.limits, "series": series}
 
 
 def charts_of(cables: Sequence[str], limits: Sequence[float]) -> tuple[Chart, ...]:
@@ -86,11 +73,15 @@ class MovingPlots(ui.element, component="plots.js"):
     So a slow browser, or a page in the background, delays nothing and piles nothing up. The
     component also has `compare(rows, name)`, `show_span(seconds)` and `cursor(time)`, to be called
     by `run_method`; None ends each of them.
+
+    Attributes:
+        newest: Time of the newest row that a browser has [s]; -inf: it has none.
     """
 
     def __init__(self, mounted: Callable[[], None]) -> None:
         """Without charts; `mounted` is called whenever a browser shows it anew, empty."""
         super().__init__()
+        self.newest = -math.inf
         self._sent: float | None = None  # when rows were sent that are not drawn yet
         self._lag = FIRST_LAG
         self.on("drawn", self._drawn)
@@ -98,13 +89,16 @@ class MovingPlots(ui.element, component="plots.js"):
 
     def begin(self, charts: Sequence[Chart], duration: float, rows: Sequence[Row]) -> None:
         """Shows other charts, with rows that are there already, of a run that lasts so long [s]."""
-        self.run_method("begin", [chart.plain() for chart in charts], duration)
+        self.newest = -math.inf
+        self.run_method("begin", charts, duration)
         self.put(rows)
 
     def put(self, rows: Sequence[Row]) -> None:
         """Adds rows; to be called when the browser is ready for them."""
         self._sent = monotonic()
         self.run_method("put", rows, self._sent)
+        if rows:
+            self.newest = rows[-1][0] or 0.0
 
     @property
     def is_ready(self) -> bool:

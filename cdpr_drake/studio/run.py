@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import base64
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from weakref import WeakKeyDictionary
+from typing import Any
 
+import numpy as np
 from nicegui import run, ui
 
 from cdpr_drake.analyses.runs.log import PARTS
+from cdpr_drake.analyses.runs.steering import BREAK, PUSH
 from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.studio.boards import Entry
 from cdpr_drake.studio.jobs import Job, JobState
+from cdpr_drake.studio.numbers import pair_table
 from cdpr_drake.studio.panel import COMPARED, RUN, robot_argument, show_errors
+from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.runs import RunBoard
+from cdpr_drake.studio.runs import NO_RUN, SPEEDS, FinishedRun, RunBoard, RunJob, Sample
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.views import send_file
-from cdpr_drake.studio.watch import RunWatch
+from cdpr_drake.studio.side_by_side import Pair, pairs
+from cdpr_drake.studio.views import leaves, send_file, show_results
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -28,43 +34,102 @@ STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 TICK, SLOW_TICK = 1.0 / 30.0, 0.5
 """Times between looks at a run, and at jobs and folders [s]."""
 
+SCENE_SHARE, RAREST_SCENE = 3.0, 2.0
+"""The scene is drawn when the browser has drawn its plots, at most once in so many times what it
+needs for that, and at least once in so long [s]: one thread of the browser draws both, and without
+a graphics card the scene takes most of its time."""
+
 SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
 
-NOTHING = "none"
+READING = "reading the log"
 
 EMPTY = (
     "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "
     "of the runs in the working folder."
 )
 
-_boards: WeakKeyDictionary[Workbench, RunBoard] = WeakKeyDictionary()
-"""What each session looks at, as long as it has a workbench."""
+WORKING = (JobState.QUEUED, JobState.RUNNING, JobState.PAUSED)
+
+STEERING: dict[str, tuple[str, Callable[[RunJob], None], Callable[[RunJob], bool]]] = {
+    "Pause": ("pause", lambda job: job.tell("pause"), lambda job: not job.pace["paused"]),
+    "Go on": ("play_arrow", lambda job: job.tell("go"), lambda job: job.pace["paused"]),
+    "Step": (
+        "skip_next", lambda job: job.tell("step"), lambda job: job.state == JobState.PAUSED
+    ),
+    "Stop": ("stop", RunJob.stop, lambda job: True),
+}  # fmt: skip
+"""Buttons with their icons, what they do, and if a run that works takes it now."""
+
+DIRECTIONS = {
+    f"{sign}{axis}": factor * np.eye(3)[k]
+    for k, axis in enumerate("xyz") for sign, factor in (("+", 1.0), ("-", -1.0))
+}  # fmt: skip
+"""Directions of a push in W."""
+
+OF_THE_PROGRAM = ("versions", "wall_time_s", "realtime_factor")
+"""Keys of a summary that say nothing about the run."""
 
 
 def run_panel(bench: Workbench) -> None:
     """Places the run panel."""
-    RunPanel(bench, _boards.setdefault(bench, RunBoard(bench.jobs, bench.folder.root)))
+    RunPanel(bench)
 
 
 class RunPanel:
-    """The panel in one tab of a browser."""
+    """The panel in one tab of a browser.
 
-    def __init__(self, bench: Workbench, board: RunBoard) -> None:
+    Attributes:
+        entry: The run that is shown; None: none is.
+        run: What is shown of it: samples while it goes on, rows of its log when it is finished.
+        other: The run behind it; None: there is none.
+    """
+
+    def __init__(self, bench: Workbench) -> None:
         """Places it into the current slot."""
-        self._bench, self._board = bench, board
+        self._bench, self._board = bench, bench.kept(RunBoard)
         self._form: ScenarioForm | None = None
-        self._watch = RunWatch(bench, board)
+        self.entry: Entry | None = None
+        self.run: RunJob | FinishedRun = NO_RUN
+        self.other: FinishedRun | None = None
+        self._unreadable: set[Path] = set()  # folders
+        # What the browser has.
+        self._begun: tuple[object, tuple[Chart, ...], object] = NO_RUN, (), None
+        self._sample: Sample | None = None
+        self._jpeg = b""
         ui.add_css(STYLE)
         with ui.element("div").classes("cdpr-run"):
             self._place_start()
-            self._place_watch()
+            self._place_choice()
+            self._place_hands()
+            self._place_state()
+            self._place_plots()
+            self._place_results()
         with ui.expansion("Fields of the scenario", value=True).classes("w-full"):
             self._body = ui.element("div")
-        ui.timer(0.0, self._begin, once=True)
+        ui.timer(0.0, self._offer_scenarios, once=True)
         bench.robot.changed.subscribe(self._take_robot)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
+
+    @property
+    def job(self) -> RunJob:
+        """The job of the run, as long as the server has it."""
+        job = self.entry and self.entry.job
+        return job if isinstance(job, RunJob) else NO_RUN
+
+    @property
+    def state(self) -> str:
+        """How the run is, in a few words; empty: none is shown."""
+        job = self.job
+        if job is not NO_RUN:
+            starts = job.state == JobState.RUNNING and not job.header
+            return "starting" if starts else job.state.value
+        if isinstance(self.run, FinishedRun):
+            return "finished"
+        if self.entry is None:
+            return ""
+        return "unreadable" if self.entry.folder in self._unreadable else READING
 
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
@@ -81,32 +146,132 @@ class RunPanel:
             self._which = ui.label().classes("studio-soft").mark("run-robot")
             self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
             self._own.props("dense no-caps outline")
-            self._own.visible = False  # until the scenario says of which robot it is
+            self._own.bind_visibility_from(self._own, "text", bool)
 
-    def _place_watch(self) -> None:
-        board, watch = self._board, self._watch
+    def _place_choice(self) -> None:
+        """Places which run is shown, its speed, and pause, go, step and stop."""
+        board = self._board
         with ui.row().classes("w-full items-center no-wrap"):
             self._run = ui.select({}, label="run", on_change=self._choose_run)
             self._run.props("dense outlined").classes("col").mark("run")
-            watch.place_steering()
+            speed = ui.select([*SPEEDS], label="speed").bind_value(board, "speed")
+            speed.props("dense outlined").classes("cdpr-speed").mark("speed")
+            speed.on_value_change(lambda: self.job.tell("speed", factor=SPEEDS[board.speed]))
+            for words, (icon, act, takes) in STEERING.items():
+                props = f'dense aria-label="{words}" title="{words}"'
+                button = self._button("", icon, props, act, takes)
+                button.mark(words.lower().replace(" ", "-"))
         empty = ui.label(EMPTY).classes("studio-empty").mark("run-empty")
         empty.bind_visibility_from(board, "shown", lambda key: not key)
-        watch.place()
+
+    def _button(
+        self, words: str, icon: str, props: str, act: Callable[[RunJob], None],
+        takes: Callable[[RunJob], bool],
+    ) -> ui.button:  # fmt: skip
+        """A button that does something to a run that works, as long as that takes it."""
+        button = ui.button(words, icon=icon, on_click=lambda: act(self.job)).props(props)
+        return button.bind_enabled_from(
+            self, "job", lambda job: job.state in WORKING and takes(job)
+        )
+
+    def _place_hands(self) -> None:
+        """Places buttons that break a cable or push the platform, and what was done so."""
+
+        def break_cable(job: RunJob) -> None:
+            job.tell(BREAK, cable=self._cable.value)
+
+        def push(job: RunJob) -> None:
+            peak = float(force.value or 0.0) * DIRECTIONS[str(direction.value)]
+            job.tell(PUSH, force=peak.tolist(), seconds=float(time.value or 0.0))
+
+        def hand(act: str, icon: str, title: str, do: Callable[[RunJob], None]) -> None:
+            props, words = f'no-caps outline title="{title}"', act.capitalize()
+            button = self._button(words, icon, props, do, lambda job: act in job.takes)
+            button.mark(act)
+
+        with ui.element("div").classes("w-full") as box:
+            with ui.row().classes("w-full items-center"):
+                self._cable = ui.select({}, label="cable").mark("hand-cable")
+                hand(BREAK, "content_cut", "The cable pulls no more from now on", break_cable)
+                direction = ui.select([*DIRECTIONS], value="+x", label="direction in W")
+                force = ui.number("force", value=5.0, min=0.0, suffix="N").mark("push-force")
+                time = ui.number("for", value=0.3, min=0.0, step=0.1, suffix="s").mark("push-time")
+                hand(PUSH, "touch_app", "A push at Po, a half sine with this peak force", push)
+            done = ui.label().classes("cdpr-soft").props('role="status"').mark("hand-done")
+        direction.classes("w-32").mark("push-direction")
+        for field in (self._cable, direction, force, time):
+            field.props("dense outlined")
+        for number in (force, time):
+            number.classes("w-24")
+        done.bind_text_from(self, "job", _done_by_hand)
+        box.bind_visibility_from(self, "job", lambda job: bool(job.takes))
+
+    def _place_state(self) -> None:
+        """Places the camera's image, and how the run is."""
+        with ui.element("div").classes("cdpr-run-view"):
+            with ui.element("figure").classes("cdpr-camera") as figure:
+                self._image = ui.element("img").props('alt="Image of the camera"').mark("camera")
+            with ui.element("div").classes("cdpr-run-state"):
+                state = ui.label().classes("cdpr-state").props('role="status"').mark("run-state")
+                outcome = ui.label().classes("cdpr-outcome").mark("outcome")
+                self._bar = ui.linear_progress(0.0, show_value=False)
+                words = ui.label().classes("cdpr-soft").mark("run-words")
+                problem = ui.label().classes("studio-problem").mark("run-problem")
+                key = ui.label("Image: detected marks are orange, desired marks green.")
+                key.classes("cdpr-soft")
+        for element in (figure, key):
+            element.bind_visibility_from(self, "_jpeg", bool)
+        state.bind_text_from(self, "state")
+        outcome.bind_text_from(self, "run", lambda shown: shown.outcome.replace("_", " "))
+        self._bar.bind_value_from(self, "job", lambda job: job.progress[0] or 0.0)
+        self._bar.bind_visibility_from(
+            self, "state", lambda state: state == READING or not self.job.state.is_over
+        )
+        words.bind_text_from(self, "job", lambda job: job.message or job.progress[1])
+        problem.bind_text_from(words, "text")
+        words.bind_visibility_from(self, "state", lambda state: state != JobState.FAILED)
+        problem.bind_visibility_from(self, "state", lambda state: state == JobState.FAILED)
+
+    def _place_plots(self) -> None:
+        """Places plots over time, and a slider for the time of a finished run."""
+        self._plots = MovingPlots(self._begin)
+        with ui.row().classes("w-full items-center no-wrap") as scrub:
+            self._time = ui.label("0.00 s").classes("cdpr-time")
+            self._slider = ui.slider(min=0.0, max=1.0, step=0.001).classes("col").mark("cursor")
+            self._slider.props('aria-label="Time"').bind_value(self._board, "cursor")
+        scrub.bind_visibility_from(self, "run", lambda shown: isinstance(shown, FinishedRun))
+
+    def _place_results(self) -> None:
+        """Places the numbers of both runs, what is in the folder, and what is done with it."""
+        with ui.expansion("Both runs in numbers").classes("w-full studio-group") as self._both:
+            self._pairs = ui.html("", sanitize=False).classes("w-full").mark("run-pairs")
+        self._fold = ui.expansion("Results, figures and files", on_value_change=self._fill_results)
+        with self._fold.classes("w-full studio-group").mark("run-results"):
+            self._results = ui.element("div").classes("w-full")
+        self._both.mark("both-runs")
         with ui.row().classes("w-full items-center"):
-            self._compare = ui.select({NOTHING: NOTHING}, value=NOTHING, label="compare with")
+            self._compare = ui.select({}, label="compare with", on_change=self._choose_other)
             self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
-            self._compare.on_value_change(self._choose_other)
-            span = ui.select(list(SPANS), value="all", label="time shown").props("dense outlined")
-            span.on_value_change(lambda: watch.show_span(SPANS[str(span.value)]))
+            span = ui.select([*SPANS], value="all", label="time shown").props("dense outlined")
+            span.on_value_change(
+                lambda event: self._plots.run_method("show_span", SPANS[event.value])
+            )
             ui.space()
             recover = ui.button("Write the results so far", on_click=self._recover)
             recover.props("no-caps outline").mark("recover")
-            recover.bind_visibility_from(watch, "files", self._can_recover)
             download = ui.button("Download", icon="download", on_click=self._download)
             download.props('no-caps outline title="All files of the run"').mark("download")
-            download.bind_visibility_from(watch, "files", bool)
 
-    async def _begin(self) -> None:
+        def show(element: ui.element, where: Callable[[Entry], bool]) -> None:
+            element.bind_visibility_from(
+                self, "entry", lambda entry: entry is not None and where(entry)
+            )
+
+        show(self._fold, lambda entry: bool(entry.files) and self.job.state.is_over)
+        show(recover, lambda entry: self.job.state == JobState.FAILED and PARTS in entry.files)
+        show(download, lambda entry: bool(entry.files))
+
+    async def _offer_scenarios(self) -> None:
         """Offers scenarios, those of the working folder first."""
 
         def scenarios() -> tuple[dict[str, str], str]:
@@ -153,8 +318,7 @@ class RunPanel:
             words += "." if is_own else f", instead of the scenario's {own}."
         except CdprError as problem:
             words, fits = f"Nothing can be started: {problem}.", False
-        self._which.text, self._own.text = words, f"Open {own}"
-        self._own.visible = not is_own
+        self._which.text, self._own.text = words, "" if is_own else f"Open {own}"
         return fits
 
     async def _open_own_robot(self) -> None:
@@ -170,7 +334,7 @@ class RunPanel:
             if self._form is not None and await self._form.check():
                 if not await self._take_robot():
                     raise CdprError(self._which.text)
-                await self._board.start(paused=self._paused.value, by_hand=self._by_hand.value)
+                await self._board.simulate(paused=self._paused.value, by_hand=self._by_hand.value)
                 self._refresh()
         self._start_button.props(remove="loading")
 
@@ -180,56 +344,144 @@ class RunPanel:
             self._refresh()
 
     def _choose_other(self) -> None:
-        self._board.compared = "" if self._compare.value == NOTHING else str(self._compare.value)
-
-    def _can_recover(self, files: frozenset[str]) -> bool:
-        """True if a run that was killed left the log of what it had simulated."""
-        return self._watch.job.state == JobState.FAILED and PARTS in files
+        self._board.compared = str(self._compare.value or "")
 
     def _recover(self) -> None:
         """Writes results of a run that was killed, as far as it was simulated."""
-        job = self._watch.job
-        words, title = (
-            ["finish", str(job.folder), "--json"],
-            f"{job.title}: results of what there is",
-        )
         with show_errors():
-            self._bench.jobs.submit(Job(title, words, job.working, job.folder))
+            words = ["finish", str(self.job.folder), "--json"]
+            self._bench.jobs.submit(Job(words, self.job.working))
 
     async def _download(self) -> None:
-        if self._watch.entry is not None:
-            await send_file(self._watch.entry.folder)
+        if self.entry is not None:
+            await send_file(self.entry.folder)
+
+    async def _fill_results(self) -> None:
+        if self._fold.value and self.entry is not None and not self._results.default_slot.children:
+            with self._results:
+                await show_results(self.entry.folder)
 
     def _tick(self) -> None:
+        """Shows what is new; many times a second."""
+        shown, board, is_live = self.run, self._board, isinstance(self.run, RunJob)
         with show_errors():
-            self._watch.tick()
+            if self._begun != (shown, shown.charts, self.other):
+                self._begin()
+            elif self._plots.is_ready or not is_live:
+                newest = self._plots.newest
+                new = [plot_row(sample) for sample in shown.samples if sample["t"] > newest]
+                if new:
+                    self._plots.put(new)
+                self._look()
+            if self._bench.panel not in ("", "run"):
+                board.give_back()
+            elif shown.scenario is not None and self._sample is not None:
+                wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE) if is_live else 0.0
+                board.draw(shown, self._sample, wait)
+
+    def _begin(self) -> None:
+        """Shows all that is there, as after a change, or in a browser that shows it anew."""
+        shown, other = self.run, self.other
+        self._begun, self._sample = (shown, shown.charts, other), None
+        self._plots.begin(shown.charts, shown.end, [plot_row(sample) for sample in shown.samples])
+        rows = [] if other is None else [plot_row(sample) for sample in other.samples]
+        self._plots.run_method("compare", rows, "" if other is None else other.folder.name)
+        self._both.visible = False
+        if isinstance(shown, FinishedRun) and other is not None:
+            self._both.visible = True
+            both = run_pairs(shown.summary, other.summary)
+            self._pairs.content = pair_table(both, shown.folder.name, other.folder.name)
+        self._look()
+
+    def _look(self) -> None:
+        """Camera and plots show the time of the slider, or the newest that a run has shown."""
+        sample, jpeg = self.run.at(self._board.cursor)
+        if jpeg is not self._jpeg:
+            self._jpeg = jpeg
+            self._image.props["src"] = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
+        if sample is not None and sample is not self._sample and isinstance(self.run, FinishedRun):
+            self._time.text = f"{sample['t']:.2f} s"
+            self._plots.run_method("cursor", sample["t"])
+        self._sample = sample
 
     async def _slow_tick(self) -> None:
-        board, watch = self._board, self._watch
         with show_errors():
-            self._refresh()
-            await watch.follow()
-            await watch.compare(board.choices().get(board.compared))
-            self._bench.results.show(RUN, watch.run.subject)
-            self._bench.results.show(COMPARED, watch.other.subject if watch.other else None)
+            other = self._refresh()
+            if other is None or self.other is None or other.folder != self.other.folder:
+                self.other = await self._read(other)
+            entry, board = self.entry, self._board
+            if self.job.state.is_over and not isinstance(self.run, FinishedRun):
+                done = await self._read(entry)
+                if done is not None and _identity(entry) == _identity(self.entry):
+                    self.run = done
+                    board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
+                    self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
+            self._bench.results.show(RUN, self.run.subject)
+            self._bench.results.show(COMPARED, self.other.subject if self.other else None)
 
-    def _refresh(self) -> None:
-        """Offers the runs that there are, and shows the one that the session looks at."""
+    async def _read(self, entry: Entry | None) -> FinishedRun | None:
+        """What a run left; None: nothing, or what cannot be read, which is said once."""
+        if entry is None or not entry.is_whole or entry.folder in self._unreadable:
+            return None
+        try:
+            return await run.io_bound(FinishedRun, entry.folder)
+        except Exception:
+            self._unreadable.add(entry.folder)
+            raise
+
+    def _refresh(self) -> Entry | None:
+        """Offers what runs there are, and shows the one looked at; returns the one behind it."""
         board, choices = self._board, self._board.choices()
         if board.shown not in choices:
             board.shown = next((key for key, entry in choices.items() if entry.job), "")
         if board.compared == board.shown:
             board.compared = ""
         _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
-        others = {NOTHING: NOTHING} | {
-            key: entry.folder.name for key, entry in choices.items()
-            if key != board.shown and (entry.job is None or entry.job.state == JobState.FINISHED)
-        }  # fmt: skip
-        _offer(self._compare, others, board.compared if board.compared in others else NOTHING)
-        self._watch.show(choices.get(board.shown))
+        whole = [key for key, entry in choices.items() if entry.is_whole and key != board.shown]
+        others = {"": "none"} | {key: key for key in whole}
+        _offer(self._compare, others, board.compared if board.compared in others else "")
+        before, self.entry = self.entry, choices.get(board.shown)
+        if _identity(before) != _identity(self.entry):
+            self.run, self._fold.value = self.job, False
+            self._unreadable.clear()
+            self._results.clear()
+        broken = {event.get("cable") for event in self.job.events}
+        names = enumerate(self.job.header.get("cables", ()))
+        left = {k: name for k, name in names if k not in broken}
+        value = self._cable.value if self._cable.value in left else next(iter(left), None)
+        _offer(self._cable, left, value)
+        is_endless = self.job.progress[0] is None
+        if is_endless != self._bar.props.get("indeterminate", False):
+            self._bar.props.set_bool("indeterminate", is_endless)
+        return choices.get(board.compared)
 
 
-def _offer(select: ui.select, options: Mapping[str, str], value: str | None) -> None:
+def run_pairs(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Pair]:
+    """Numbers and words of two summaries of runs that at least one of them has."""
+
+    def side(summary: Mapping[str, Any]) -> dict[str, Any]:
+        own = {key: value for key, value in summary.items() if key not in OF_THE_PROGRAM}
+        return {
+            name: float(value) if isinstance(value, int) else value for name, value in leaves(own)
+        }
+
+    return pairs(side(one), side(other))
+
+
+def _identity(entry: Entry | None) -> tuple[Path, Job | None] | None:
+    """What tells runs apart: one may come after another in a folder."""
+    return None if entry is None else (entry.folder, entry.job)
+
+
+def _done_by_hand(job: RunJob) -> str:
+    """What was done to a run, or refused."""
+    return "; ".join(
+        f"{event['t']:.2f} s: {event.get('words') or 'refused: ' + event['refused']}"
+        for event in job.events
+    )
+
+
+def _offer(select: ui.select, options: Mapping[Any, str], value: Any) -> None:
     """Changes options only where they are others: that closes a list that is unfolded."""
     if select.options != options:
         select.set_options(dict(options), value=value)

@@ -11,12 +11,13 @@ import math
 import socket
 import zipfile
 import zlib
-from collections.abc import Sequence
+from asyncio import Future
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -24,34 +25,42 @@ import numpy as np
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
 from cdpr_drake.analyses.runs.steering import Message, receive, send
-from cdpr_drake.arrays import Array
+from cdpr_drake.analyses.visualization.replay import RobotPicture
+from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.boards import Board, Entry
-from cdpr_drake.studio.jobs import Job, JobManager, JobState
+from cdpr_drake.studio.boards import Board
+from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.plots import Chart, charts_of
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.run_scene import RunScene
 from cdpr_drake.studio.scenario import ScenarioDraft
+from cdpr_drake.studio.scene import WORKSPACE, RobotScene, look_at_robot
+from cdpr_drake.studio.session import Workbench
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.diagrams.servo_models import ServoModel, servo_model
+from cdpr_drake.systems.robots.settings import CableSettings
 from cdpr_drake.systems.scenarios.files import check_moves_robot
 from cdpr_drake.systems.scenarios.visual_servo_scenario import Scenario
 
 RUNS = "runs"
 """Folder of results in the working folder, as that of `cdpr simulate`."""
 
+SPEEDS: dict[str, float | None] = {
+    "x 0.1": 0.1, "x 0.5": 0.5, "real time": 1.0, "x 2": 2.0, "x 5": 5.0, "x 20": 20.0,
+    "as fast as possible": None,
+}  # fmt: skip
+"""Speeds that are offered, as factors of real time."""
+
 MOST_SAMPLES = 3000
 """Samples of a run that are kept, or rows of a log, evenly spread."""
 
 LOG, SUMMARY, SCENARIO = "log.npz", "summary.json", "scenario.yaml"
 
-COLUMNS = (
-    "time", "X_WP", "X_WP_desired", "tensions", "lengths", "unstrained_lengths", "found"
-)  # fmt: skip
-"""Arrays of the log that are shown, besides marks of a camera."""
+PATHS = ("visualizer", "cables", "studio", WORKSPACE)
+"""What is taken out of a scene before a run's robot is put there."""
 
 Sample = dict[str, Any]
 
@@ -76,10 +85,8 @@ class RunJob(Job):
         The speed is in simulated seconds per second, None: as fast as possible. If `paused`, it
         stands at the start until it is told to go.
         """
-        title = Path(name).stem if name.endswith((".yaml", ".yml")) else name
         options = [f"--set={item}" for item in settings]
-        words = ["simulate", name, *options, f"--out={folder}", "--json"]
-        super().__init__(title, words, working, folder)
+        super().__init__(["simulate", name, *options, f"--out={folder}", "--json"], working, folder)
         self.scenario: Any = None
         self.subject: Subject | None = None
         self.header: dict[str, Any] = {}
@@ -90,6 +97,11 @@ class RunJob(Job):
         self.pace: dict[str, Any] = {"paused": paused, "speed": speed}
         self._image, self._count, self._stride = b"", 0, 1
         self._connection: Connection | None = None
+
+    @property
+    def takes(self) -> Sequence[str]:
+        """What can be done to it by hand, once it has said so."""
+        return self.header.get("takes", ())
 
     @property
     def outcome(self) -> str:
@@ -146,7 +158,9 @@ class RunJob(Job):
             self.progress = min(sample["t"] / self.end, 1.0), _progress_words(sample)
 
     async def _work(self) -> None:
-        ours, self._steering = socket.socketpair()
+        ours, theirs = socket.socketpair()
+        self.descriptors = (theirs.detach(),)
+        self.arguments += (f"--steered-by={self.descriptors[0]}",)
         self._connection = connection = Connection(ours.detach())
         self.tell("speed", factor=self.pace["speed"])
         if self.pace["paused"]:
@@ -159,7 +173,7 @@ class RunJob(Job):
                 while True:
                     loop.call_soon_threadsafe(self.take, receive(connection))
 
-        Thread(target=listen, name=self.title, daemon=True).start()
+        Thread(target=listen, daemon=True).start()
         await super()._work()
         self._connection = None
 
@@ -169,6 +183,11 @@ def _progress_words(sample: Sample) -> str:
     if distance is None or angle is None:
         return f"{sample['t']:.2f} s"
     return f"{sample['t']:.2f} s, error {1e3 * distance:.2f} mm, {math.degrees(angle):.2f} deg"
+
+
+NO_RUN = RunJob("", Path(), Path())
+NO_RUN.state = JobState.FINISHED
+"""What is shown where nothing is, and nobody works."""
 
 
 class FinishedRun:
@@ -194,25 +213,39 @@ class FinishedRun:
         self.subject = subject_of(robot)
         cables = [cable.name for cable in robot.cables]
         self.charts = charts_of(cables, shown_limits(self.scenario, robot))
-        self._model: ServoModel | None = None
-        self._mark = ""
-        if isinstance(self.scenario, Scenario):
-            self._model = servo_model(self.scenario, robot)
-            self._mark, self._picture = f"{self._model.target.mark}_px", MarksPicture(self._model)
+        model = servo_model(self.scenario, robot) if isinstance(self.scenario, Scenario) else None
+        self._picture = None if model is None else MarksPicture(model)
+        self._drawn = -1, b""
         try:
             self.summary: dict[str, Any] = load_json((folder / SUMMARY).read_text(encoding="utf-8"))
             self.outcome = str(self.summary.get("outcome", ""))
             with np.load(folder / LOG, allow_pickle=False) as log:
-                count = len(log["time"])
-                rows = np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int))
-                self._log: dict[str, Array] = {
-                    name: log[name][rows] for name in (*COLUMNS, self._mark) if name in log
-                }
-            self.times = self._log["time"]
-            self.end = float(self.times[-1])
-            self.samples = self._samples()
+                self._read(log, model)
         except (OSError, LookupError, ValueError, zipfile.BadZipFile, zlib.error) as problem:
             raise OutputFolderError(f"{folder.name}: cannot be read: {problem}") from problem
+
+    def _read(self, log: Mapping[str, np.ndarray], model: ServoModel | None) -> None:
+        """Samples, and marks where they are found."""
+        count = len(log["time"])
+        rows = np.unique(np.linspace(0, count - 1, min(count, MOST_SAMPLES)).astype(int))
+        self.times, poses = log["time"][rows], log["X_WP"][rows]
+        self.end = float(self.times[-1])
+        if model is None:
+            distance, angle = pose_rows_distance(poses, log["X_WP_desired"][rows])
+        else:
+            self._marks = log[f"{model.target.mark}_px"][rows]
+            self._is_found = log["found"][rows, 0] > 0.0
+            pairs = zip(poses, self.times, strict=True)
+            errors = [model.seen_error(pose_from_row(pose), float(time)) for pose, time in pairs]
+            distance, angle = np.array(errors).T
+        unstrained = "unstrained_lengths"
+        columns = {
+            "t": self.times, "position_error": distance, "rotation_error": angle,
+            "tensions": log["tensions"][rows], "lengths": log["lengths"][rows], "pose": poses,
+            "unstrained": log[unstrained][rows] if unstrained in log else np.full(len(rows), None),
+        }  # fmt: skip
+        samples = zip(*(values.tolist() for values in columns.values()), strict=True)
+        self.samples = [finite(dict(zip(columns, sample, strict=True))) for sample in samples]
 
     def at(self, time: float | None) -> tuple[Sample, bytes]:
         """Sample nearest to a time [s], None: the end; and the camera's image, empty: no camera.
@@ -220,75 +253,56 @@ class FinishedRun:
         The image is drawn from the marks of the log, as JPEG.
         """
         row = int(np.argmin(np.abs(self.times - (self.end if time is None else time))))
-        if self._model is None:
-            return self.samples[row], b""
-        marks = self._log[self._mark][row] if self._log["found"][row, 0] > 0.0 else None
-        return self.samples[row], self._picture.jpeg(marks, None)
-
-    def _samples(self) -> list[Sample]:
-        log, model = self._log, self._model
-        if model is None:
-            distance, angle = pose_rows_distance(log["X_WP"], log["X_WP_desired"])
-        else:
-            pairs = zip(log["X_WP"], self.times, strict=True)
-            errors = [model.seen_error(pose_from_row(pose), float(time)) for pose, time in pairs]
-            distance, angle = np.array(errors).T
-        columns = {
-            "t": self.times, "position_error": distance, "rotation_error": angle,
-            "tensions": log["tensions"], "lengths": log["lengths"], "pose": log["X_WP"],
-            "unstrained": log.get("unstrained_lengths", np.full(len(self.times), None)),
-        }  # fmt: skip
-        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-        return [finite(dict(zip(columns, row, strict=True))) for row in rows]
+        if self._picture is not None and row != self._drawn[0]:
+            marks = self._marks[row] if self._is_found[row] else None
+            self._drawn = row, self._picture.jpeg(marks, None)
+        return self.samples[row], self._drawn[1]
 
 
-def is_run(folder: Path) -> bool:
-    """True if a folder has the results of a run."""
-    return all((folder / name).is_file() for name in (LOG, SUMMARY, SCENARIO))
+def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
+    """The robot of a scenario and all that is round it."""
+    robot = load_robot(scenario.robot)
+    servo, cables, world = scenario, None, None
+    if not isinstance(scenario, Scenario):
+        servo, world = None, scenario.world
+        cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
+    picture = RobotPicture(
+        robot, robot.tension_limits()[1], servo, cables, meshcat=scene.meshcat, world=world,
+        colors=[nth_look(k).color for k in range(len(robot.cables))],
+    )  # fmt: skip
+    look_at_robot(scene.meshcat, robot)
+    return picture
 
 
-def read_run(folder: Path) -> FinishedRun | None:
-    """The results in a folder, read once; None: there are none.
-
-    Raises:
-        CdprError: They cannot be read.
-    """
-    return _read(folder, (folder / LOG).stat().st_mtime_ns) if is_run(folder) else None
-
-
-@lru_cache(maxsize=4)
-def _read(folder: Path, written: int) -> FinishedRun:
-    return FinishedRun(folder)
-
-
-NO_RUN = RunJob("", Path(), Path())
-NO_RUN.state = JobState.FINISHED
-"""What is shown where nothing is, and nobody works."""
-
-RunEntry = Entry[RunJob]
-
-
-class RunBoard(Board[RunJob]):
-    """What the run panel of a session shows; all its tabs show the same.
+class RunBoard(Board):
+    """What the run panel of a session shows, in all its tabs and in its scene.
 
     Attributes:
-        scene: Draws the run that is shown.
         draft: The scenario that is worked on; None: none was chosen.
         compared: Key of the run behind the one that is shown; empty: none.
-        speed: Speed of the next run; None: as fast as possible.
+        speed: Speed of the next run, a name of `SPEEDS`.
         cursor: Time that is looked at in a finished run [s]; None: its end.
+        in_scene: The sample of a run that is in the scene, or on its way; None: the open robot is.
     """
 
-    def __init__(self, jobs: JobManager, root: Path) -> None:
-        """With the jobs of the server and the working folder."""
-        super().__init__(jobs, root, RUNS, RunJob, is_run)
-        self.scene = RunScene()
+    def __init__(self, bench: Workbench) -> None:
+        """Of a workbench, without a run in its scene."""
+        super().__init__(bench.jobs, bench.folder.root, RUNS)
+        self._bench = bench
         self.draft: ScenarioDraft | None = None
-        self.compared = ""
-        self.speed: float | None = 1.0
+        self.compared, self.speed = "", "real time"
         self.cursor: float | None = None
+        self.in_scene: Sample | None = None
+        self._draws, self._drawn = False, 0.0
+        # Of the calculator's thread: the robot of a scenario.
+        self._scenario: Any = None
+        self._picture: RobotPicture
 
-    async def start(self, *, paused: bool = False, by_hand: bool = False) -> RunJob:
+    def is_whole(self, folder: Path) -> bool:
+        """True if a folder has the results of a run."""
+        return all((folder / name).is_file() for name in (LOG, SUMMARY, SCENARIO))
+
+    async def simulate(self, *, paused: bool = False, by_hand: bool = False) -> None:
         """Begins a run of the draft, perhaps standing at the start, and looks at it.
 
         `by_hand`: cables can be broken and the platform pushed while it runs.
@@ -300,7 +314,6 @@ class RunBoard(Board[RunJob]):
         self._jobs.submit(job)
         assert job.folder is not None
         self.shown, self.cursor = job.folder.name, None
-        return job
 
     def _job(self, paused: bool, by_hand: bool) -> RunJob:
         """A run of the draft, which is read for that."""
@@ -310,7 +323,48 @@ class RunBoard(Board[RunJob]):
         job = RunJob(
             draft.name, self._root, self._jobs.free_folder(self.folder / scenario.name),
             settings=(*draft.settings(), *(draft.by_hand() if by_hand else ())),
-            speed=self.speed, paused=paused,
+            speed=SPEEDS[self.speed], paused=paused,
         )  # fmt: skip
         job.scenario, job.subject = scenario, subject_of(load_robot(scenario.robot))
         return job
+
+    def draw(self, run: RunJob | FinishedRun, sample: Sample, wait: float) -> None:
+        """Draws a sample of a run, unless it is there, or one was drawn less than `wait` before [s]
+        or is being drawn; to be called again and again."""
+        if sample is self.in_scene or self._draws or monotonic() - self._drawn < wait:
+            return
+        bench, dark = self._bench, bool(self._bench.dark)
+        self.in_scene, self._draws = sample, True
+
+        def done(future: Future[None]) -> None:
+            self._draws, self._drawn = False, monotonic()
+            if future.exception() is None and self.in_scene is not None:
+                bench.draws(run.subject)
+
+        bench.draw(lambda scene: self._draw(scene, run.scenario, sample, dark), done)
+
+    def give_back(self) -> None:
+        """Lets the open robot be shown again."""
+        if self.in_scene is not None:
+            self.in_scene = None
+            self._bench.draw(self._leave)
+            self._bench.draws(None)
+            self._bench.ask()
+
+    def _leave(self, scene: RobotScene) -> None:
+        self._scenario = None
+        scene.redraw()
+
+    def _draw(self, scene: RobotScene, scenario: Any, sample: Sample, dark: bool) -> None:
+        if scenario is not self._scenario:
+            for path in PATHS:
+                scene.meshcat.Delete(path)
+            self._scenario, self._picture = scenario, _picture(scene, scenario)
+            scene.set_dark(dark)
+        unstrained = sample["unstrained"]
+        self._picture.draw(
+            pose_from_row(np.array(sample["pose"], float)),
+            np.array(sample["tensions"], float),  # None becomes NaN
+            float(sample["t"]),
+            None if unstrained is None else np.array(unstrained, float),
+        )

@@ -13,8 +13,8 @@ from weakref import WeakKeyDictionary
 
 from nicegui import run, ui
 
-from cdpr_drake.studio.boards import Entry, VerbBoard, VerbJob
-from cdpr_drake.studio.jobs import JobState
+from cdpr_drake.studio.boards import Board, Entry
+from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.panel import notify, robot_argument, show_errors
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
@@ -60,7 +60,7 @@ class VerbView:
 
     def __init__(self, bench: Workbench, tab: VerbTab) -> None:
         """For a workbench."""
-        self.board = VerbBoard(bench.jobs, bench.folder.root, tab.folder, VerbJob)
+        self.board = Board(bench.jobs, bench.folder.root, tab.folder)
         self.filled: Filled = {}
         self.verb = next(iter(tab.first or tab.verbs or bench.commands))
 
@@ -94,7 +94,7 @@ class VerbPanel:
         self._bench, self._tab, self.view = bench, tab, view_of(bench, tab)
         self._given, self._show = given, show
         self._form: VerbForm | None = None
-        self._job: VerbJob | None = None
+        self._job: Job | None = None
         self._shown: tuple[Path | None, float] = None, 0.0
         self._verbs = {name: bench.commands[name] for name in tab.verbs or bench.commands}
         titles = {name: f"{name}: {verb.line}" for name, verb in self._verbs.items()}
@@ -185,7 +185,7 @@ class VerbPanel:
                 await self.view.board.go_on(entry, self._verbs, self._bench.folder)
             self._refresh()
 
-    def _refresh(self) -> Entry[VerbJob] | None:
+    def _refresh(self) -> Entry | None:
         """Follows jobs and folders; returns what is looked at."""
         board = self.view.board
         entry = board.shown_entry()
@@ -225,7 +225,7 @@ class VerbPanel:
                 self._shown = stamp
                 await self._place_results(whole)
 
-    async def _place_results(self, entry: Entry[VerbJob] | None) -> None:
+    async def _place_results(self, entry: Entry | None) -> None:
         """Reads results in another thread, places them, and says what they are about."""
         self._body.clear()
         self._bench.results.show(self._tab.result, None)

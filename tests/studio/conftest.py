@@ -13,7 +13,7 @@ import pytest
 
 from cdpr_drake.analyses.logs.replay import replay_log
 from cdpr_drake.cli.app import main
-from tests.studio.pages import held_page
+from tests.studio.pages import HeldPage
 from tests.studio.served import served
 
 ROOT = Path(__file__).parents[2]
@@ -69,8 +69,9 @@ def work(tmp_path_factory):
 @pytest.fixture(scope="module")
 def held(request, work):
     """That page, of the module's `ROBOT`."""
-    with held_page(work, request.module.ROBOT) as page:
-        yield page
+    page = HeldPage(work, request.module.ROBOT)
+    yield page
+    page.close()
 
 
 @pytest.fixture
@@ -112,7 +113,7 @@ READ_IN_LOOP: list[str] = []
 
 
 HANDLERS = tuple(f"/studio/{name}" for name in ("robot.py", "settings_form", "page",
-                "sessions", "run.py", "watch", "logs", "studies", "views", "plots"))  # fmt: skip
+                "sessions", "run.py", "logs", "studies", "views", "plots"))  # fmt: skip
 """What calls for reading in a page; a test may read what it likes."""
 
 

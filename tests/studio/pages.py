@@ -2,7 +2,7 @@
 
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import asynccontextmanager, contextmanager
+from contextlib import asynccontextmanager
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
@@ -11,6 +11,9 @@ from cdpr_drake.cli.studio import verbs
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
+
+LONGEST = 1200.0
+"""Nothing here takes as long, unless it hangs [s]."""
 
 
 @asynccontextmanager
@@ -35,7 +38,7 @@ async def opened_page(folder, robot="acrobot_large"):
     bench = Workbench(folder, robot, calculator=calculator, commands=verbs)
     try:
         async with simulated(make_page(lambda _: bench)) as user:
-            await until(lambda: not _loading(user))
+            await until(lambda: not shown(user, "panel-loading"))
             yield user, bench, user.client
     finally:
         calculator.shutdown(cancel_futures=True)
@@ -76,22 +79,6 @@ class HeldPage:
                     asked[1].set_result(await asked[0])
                 except BaseException as problem:
                     asked[1].set_exception(problem)
-
-
-@contextmanager
-def held_page(folder, robot):
-    """A page for several tests, see `HeldPage`."""
-    held = HeldPage(folder, robot)
-    try:
-        yield held
-    finally:
-        held.close()
-
-
-def _loading(user):
-    """Whether panels are still to come."""
-    with user:
-        return bool(list(ElementFilter(marker="panel-loading")))
 
 
 async def settled(bench):

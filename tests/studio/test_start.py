@@ -66,7 +66,7 @@ async def test_a_panel_that_cannot_be_loaded_says_so_and_the_others_come(held):
 
 async def test_a_sign_says_that_a_job_works(user, bench, tmp_path):
     assert not shown(user, "job-at-work")
-    job = Job("job", ["import time; time.sleep(3600)"], tmp_path)
+    job = Job(["import time; time.sleep(3600)"], tmp_path)
     job.program = (sys.executable, "-c")
     bench.jobs.submit(job)
     await until(lambda: shown(user, "job-at-work"))

@@ -9,7 +9,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import write_asked
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.run import _boards
+from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.verb_panel import view_of
 from cdpr_drake.studio.workspace import TAB, _views
 from cdpr_drake.studio.yaml_edit import with_value
@@ -150,7 +150,7 @@ async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, 
         assert bench.drawn.robot == ROBOT
         open_panel(user, "robot")
         await until(lambda: bench.drawn is None)
-        assert _boards[bench].scene.sample is None
+        assert bench.kept(RunBoard).in_scene is None
         open_panel(user, "run")
     await until(lambda: bench.drawn is not None)
     open_panel(user, "robot")
@@ -162,7 +162,7 @@ async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, 
 
 async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, work):
     open_panel(user, "run")
-    board = _boards[bench]
+    board = bench.kept(RunBoard)
     await until(lambda: board.draft is not None)
     assert board.draft.own_robot == ROBOT
     await until(lambda: board.draft.settings() == ())
