@@ -65,7 +65,7 @@ PANELS = {
     ),
     "logs": Panel("Logs", "timeline", "logs:logs_panel", {LOG: "The comparison"}),
     "studies": Panel("Studies", "science", "studies:studies_panel", {STUDY: "Studies"}),
-    "commands": Panel("Commands", "terminal", "commands:commands_panel", {ANSWER: "The answer"}),
+    "commands": Panel("Commands", "terminal", "verb_panel:commands_panel", {ANSWER: "The answer"}),
 }  # fmt: skip
 """Panels by name, in the order of their tabs."""
 

@@ -1,6 +1,6 @@
 """Results of any command in the page: verdicts, tables, numbers, figures, pages and files.
 
-`show_results(folder)` shows what a folder has of these, `View.of(data)` numbers alone. Nothing in a
+`show_results(folder)` shows what a folder has of these, `View(data)` numbers alone. Nothing in a
 file is run with the rights of the page: words are escaped, figures are images, pages are in a
 sandbox.
 """
@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import base64
 import zipfile
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from nicegui import run, ui
 
@@ -50,8 +49,9 @@ Leaf = int | float | str | None
 Words = tuple[list[str], list[list[str]]]
 """Headings, and rows of words."""
 
+T = TypeVar("T")
 
-@dataclass(frozen=True)
+
 class View:
     """What a page shows of results.
 
@@ -64,29 +64,21 @@ class View:
         robot: Name of the robot that they are about; empty: they do not say.
     """
 
-    facts: list[tuple[str, str]]
-    statements: list[dict[str, str]]
-    tables: dict[str, Words]
-    folder: Path | None = None
-    files: Mapping[str, Path] = field(default_factory=dict)
-    robot: str = ""
-
-    @classmethod
-    def of(
-        cls, data: Mapping[str, Any], folder: Path | None = None, most_rows: int = MOST_ROWS
-    ) -> View:
+    def __init__(
+        self, data: Mapping[str, Any], folder: Path | None = None, most_rows: int = MOST_ROWS
+    ) -> None:
         """Of a command's numbers as JSON with so many rows of its tables, and perhaps its files."""
         tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
-        statements = [
+        self.statements = [
             {str(key): _words(value) for key, value in row.items()}
             for row in tables.pop("statements", ())
         ]
         rest = {key: value for key, value in data.items() if key not in tables}
-        facts = [(name, _words(value)) for name, value in leaves(rest)]
-        shown = dict(_table(key, rows, most_rows) for key, rows in tables.items())
-        files = {} if folder is None else _files(folder)
+        self.facts = [(name, _words(value)) for name, value in leaves(rest)]
+        self.tables = dict(_table(key, rows, most_rows) for key, rows in tables.items())
+        self.folder, self.files = folder, {} if folder is None else _files(folder)
         robot = data.get("robot")
-        return cls(facts, statements, shown, folder, files, robot if isinstance(robot, str) else "")
+        self.robot = robot if isinstance(robot, str) else ""
 
     @property
     def figures(self) -> dict[str, Path]:
@@ -138,23 +130,22 @@ class View:
         place = ui.element("div").classes("w-full")
 
         def show() -> None:
-            place.clear()
-            with place:
+            with place.clear():
                 place_figure(self.figures[str(chosen.value)])
 
         chosen.on_value_change(show)
         show()
 
 
-def read_results(folder: Path) -> View:
-    """Reads what a command left in a folder.
+def read_numbers(folder: Path) -> dict[str, Any]:
+    """Numbers that a command left in a folder, as JSON; empty: it has not finished there.
 
     Raises:
-        CdprError: Its numbers cannot be read.
+        CdprError: They cannot be read.
     """
     path = numbers_file(folder)
     if path is None:
-        return View.of({}, folder)
+        return {}
     name = f"{folder.name}: {path.name}"
     try:
         if path.stat().st_size > LARGEST_RESULTS:
@@ -164,7 +155,16 @@ def read_results(folder: Path) -> View:
         raise CdprError(f"{name}: cannot be read: {problem}") from problem
     if not isinstance(data, dict):
         raise CdprError(f"{name}: found no results of a command")
-    return View.of(data, folder)
+    return data
+
+
+def read_results(folder: Path) -> View:
+    """Reads what a command left in a folder.
+
+    Raises:
+        CdprError: Its numbers cannot be read.
+    """
+    return View(read_numbers(folder), folder)
 
 
 def leaves(
@@ -239,18 +239,26 @@ def zipped(folder: Path) -> bytes:
     return file.getvalue()
 
 
-async def show_results(folder: Path) -> None:
-    """Places what a command left in a folder into the current slot, which shows a sign meanwhile.
+async def read_behind(read: Callable[[], T]) -> T | None:
+    """What another thread reads, which the current slot shows a sign of meanwhile.
 
-    It is read in another thread. What cannot be read is a message in the page.
+    None if nobody waits for it any more: the server is ending, or the slot shows something else.
     """
     sign = ui.spinner(size="lg")
+    try:
+        value = await run.io_bound(read)
+        return None if sign.is_deleted else value
+    finally:
+        if not sign.is_deleted:
+            sign.delete()
+
+
+async def show_results(folder: Path) -> None:
+    """Places what a command left in a folder into the current slot, or says what is wrong."""
     with show_errors():
-        view = await run.io_bound(read_results, folder)
-        if view is not None and not sign.is_deleted:  # the server is not ending, the place is there
+        view = await read_behind(lambda: read_results(folder))
+        if view is not None:
             view.place()
-    if not sign.is_deleted:
-        sign.delete()
 
 
 def _statements(statements: list[dict[str, str]]) -> str:
