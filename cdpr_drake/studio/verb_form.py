@@ -40,52 +40,45 @@ class Option:
     """An option of a verb, or a word that stands by itself.
 
     Attributes:
-        name: As the help shows it, with dashes if it has any.
-        key: The same without dashes.
-        help: What it is, with units and ranges.
-        default: Its default; empty: none.
-        choices: Words that are offered.
+        argument: As the command line declares it.
+        key: Its name without dashes.
         is_switch: True if it takes no value.
-        is_free: True if it takes other words than `choices`.
-        several: True if it takes several words with commas between.
         many: True if it may be repeated; a form separates the values by semicolons.
-        required: True if a command needs it.
-        takes_folder: True if it takes the path of a folder.
+        default: Its default; empty: none.
     """
 
     def __init__(self, argument: Argument) -> None:
         """Of an argument of a command line."""
-        parameter, hint = argument.parameter, argument.hint
-        metavar, default = str(parameter.metavar or ""), argument.field_info.default
-        fixed, completer = argument.get_choices() or (), parameter.completer
-        self.name, self._names = argument.name, argument.names  # of a switch for yes, then for no
-        self.key = self.name.lstrip("-").lower()
+        hint, default = argument.hint, argument.field_info.default
+        converter = argument.parameter.converter
+        self.argument, self.key = argument, argument.name.lstrip("-").lower()
         self.is_switch = bool in (hint, *get_args(hint))
-        self.several = metavar.endswith(",...")
-        self.many = bool(getattr(parameter.converter, "many", get_origin(hint) is Sequence))
-        self.is_free = not fixed and not self.several
-        self.required, self.takes_folder = bool(argument.required), metavar == "FOLDER"
-        offered: Any = completer(None) if callable(completer) else ()  # type: ignore[arg-type]
-        self.choices = [str(choice) for choice in fixed or offered]
-        self.help = " ".join(str(parameter.help or "").split()).removesuffix(".")
-        if self.many:
-            self.help += "; several by semicolons"
+        self.many = bool(getattr(converter, "many", get_origin(hint) is Sequence))
         if isinstance(default, tuple | list):
             default = ",".join(map(str, default))
-        is_empty = default is None or default is Parameter.empty
-        self.default: str | bool = "" if is_empty else str(default)
-        if hint is bool:
-            self.default = default is True
+        words = "" if default is None or default is Parameter.empty else str(default)
+        self.default: str | bool = default is True if hint is bool else words
 
     def words(self, value: str | bool) -> list[str]:
         """Words of a command line; none where the value is empty or the default."""
+        names = self.argument.names  # of a switch for yes, then for no
         if value in (self.default, ""):
             return []
         if self.is_switch:
-            return [self._names[0 if value in (True, YES) else -1]]
+            return [names[0 if value in (True, YES) else -1]]
         values = str(value).split(";") if self.many else [str(value)]
-        before = f"{self.name}=" if self.name.startswith("--") else ""
+        before = f"{self.argument.name}=" if self.is_named else ""
         return [before + part.strip() for part in values]
+
+    @property
+    def is_named(self) -> bool:
+        """False of a word that stands by itself."""
+        return self.argument.name.startswith("--")
+
+    @property
+    def metavar(self) -> str:
+        """What the help shows in the place of its value."""
+        return str(self.argument.parameter.metavar or "")
 
 
 @dataclass(frozen=True)
@@ -117,12 +110,12 @@ class Verb:
     @property
     def writes_folder(self) -> bool:
         """True if it writes a folder of results, whose place is given to it."""
-        return "out" in self.options and self.options["out"].takes_folder
+        return "out" in self.options and self.options["out"].metavar == "FOLDER"
 
     @property
     def needs_robot(self) -> bool:
         """True if no robot is taken where none is named."""
-        return "robot" in self.options and self.options["robot"].required
+        return "robot" in self.options and bool(self.options["robot"].argument.required)
 
     def words(self, values: Mapping[str, str | bool], folder: WorkingFolder) -> list[str]:
         """The command line with these values by key, accepted but not run.
@@ -135,7 +128,7 @@ class Verb:
         by_themselves: list[str] = []
         for key, option in self.options.items():
             made = option.words(values.get(key, option.default))
-            (words if option.name.startswith("--") else by_themselves).extend(made)
+            (words if option.is_named else by_themselves).extend(made)
         words += ["--", *by_themselves] if by_themselves else []
         self.accept(words, folder)
         return words
@@ -190,7 +183,7 @@ class VerbForm:
         self._inputs: dict[str, Any] = {}
         places = [name.lstrip("-") for name in PLACES] if verb.writes_folder else []
         options = {key: o for key, o in verb.options.items() if key not in {*places, *without}}
-        needed = [key for key, o in options.items() if o.required or not o.name.startswith("--")]
+        needed = [key for key, o in options.items() if o.argument.required or not o.is_named]
         shown = list(dict.fromkeys([*needed, *(first or list(options)[:MOST_OPEN])]))
         folded = [key for key in options if key not in shown]
         self._place([options[key] for key in shown])
@@ -234,33 +227,37 @@ class VerbForm:
                 made.on_value_change(lambda event, key=key: self._take(key, event.value))
 
     def _input(self, option: Option, value: str | bool) -> Any:
+        parameter, fixed = option.argument.parameter, option.argument.get_choices()
+        help = " ".join(str(parameter.help or "").split()).removesuffix(".")
         if isinstance(option.default, bool):
-            return ui.checkbox(option.help, value=bool(value))
-        choices, words = [YES, NO] if option.is_switch else list(option.choices), str(value)
+            return ui.checkbox(help, value=bool(value))
+        completer: Any = parameter.completer  # ours need no context
+        offered = completer(None) if callable(completer) else ()
+        choices = [YES, NO] if option.is_switch else list(map(str, fixed or offered))
+        words = str(value)
         if not choices or option.many:
-            shown = "" if words == option.default else words
-            before = option.default or None
-            made: Any = ui.input(value=shown, placeholder=before, autocomplete=choices)
+            made: Any = ui.input(
+                value="" if words == option.default else words,
+                placeholder=option.default or None, autocomplete=choices,
+            )  # fmt: skip
+        elif option.metavar.endswith(",..."):  # several with commas between
+            chosen = [part for part in words.split(",") if part in choices]
+            made = ui.select(choices, value=chosen, multiple=True).props("use-chips")
+        elif fixed or option.is_switch:
+            one = words if words in choices else None
+            made = ui.select(choices, value=one, clearable=not option.default)
         else:
-            made = self._select(option, choices, words)
-            made.props(f'label="{option.key}"').classes("studio-named")
-        made.props(f'dense outlined hide-bottom-space options-dense aria-label="{option.key}"')
-        made.props["hint"] = option.help
-        self._inputs[option.key] = made
-        return made
-
-    def _select(self, option: Option, choices: list[str], value: str) -> ui.select:
-        if option.several:
-            chosen = [part for part in value.split(",") if part in choices]
-            return ui.select(choices, value=chosen, multiple=True).props("use-chips")
-        if option.is_free and not option.is_switch:
-            offered = dict.fromkeys([*choices, *self._files, *filter(None, [value])])
-            return ui.select(
-                list(offered), value=value or None, clearable=True, with_input=True,
+            choices = list(dict.fromkeys([*choices, *self._files, *filter(None, [words])]))
+            made = ui.select(
+                choices, value=words or None, clearable=True, with_input=True,
                 new_value_mode="add-unique",
             )  # fmt: skip
-        one = value if value in choices else None
-        return ui.select(choices, value=one, clearable=not option.default)
+        if isinstance(made, ui.select):
+            made.props(f'label="{option.key}"').classes("studio-named")
+        made.props(f'dense outlined hide-bottom-space options-dense aria-label="{option.key}"')
+        made.props["hint"] = f"{help}; several by semicolons" if option.many else help
+        self._inputs[option.key] = made
+        return made
 
     def _take(self, key: str, value: Any) -> None:
         if isinstance(value, list):

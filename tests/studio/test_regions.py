@@ -9,7 +9,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.studio.regions import (
+from cdpr_drake.studio.workspace import (
     PLANE,
     UNKNOWN,
     Plane,
@@ -20,20 +20,32 @@ from cdpr_drake.studio.regions import (
 )
 
 
+@pytest.fixture(scope="module")
+def meshcat():
+    return open_meshcat()
+
+
+def computed_regions(folder, *words):
+    """What a command leaves in a folder, and its regions."""
+    with pytest.raises(SystemExit):
+        main([*words, "--grid=3,3,3", f"--out={folder}", "--json"])
+    return json.loads((folder / "results.json").read_text()), read_regions(folder)
+
+
 def test_regions_have_the_volumes_that_the_command_printed(computed):
-    regions = read_regions(computed)
-    printed = (computed / "printed.txt").read_text()
     told = json.loads((computed / "results.json").read_text())["workspaces"]
-    assert [layer.name for layer in regions.layers] == ["all", "static", "wrench-feasible"]
-    for layer in regions.layers:
+    rows = [line.split() for line in (computed / "printed.txt").read_text().splitlines()]
+    layers = read_regions(computed).layers
+    assert [layer.name for layer in layers] == ["all", "static", "wrench-feasible"]
+    for layer in layers:
         assert layer.volume == told[layer.name]["corners_m3"]
-        rows = [line.split() for line in printed.splitlines()]
         (row,) = [row for row in rows if row[:1] == [layer.name]]
         assert f"{layer.volume:.4g}" in row
 
 
-def test_layers_and_a_plane_are_put_into_a_scene_and_taken_out(computed):
-    regions, meshcat = read_regions(computed), open_meshcat()
+def test_layers_and_a_plane_are_put_into_a_scene_and_taken_out(computed, meshcat):
+    regions = read_regions(computed)
+    assert regions.normals() == [0, 1, 2]
     show_regions(meshcat, regions, {"static"})
     assert meshcat.HasPath("workspaces/static")
     assert meshcat.HasPath("workspaces/all")
@@ -43,21 +55,17 @@ def test_layers_and_a_plane_are_put_into_a_scene_and_taken_out(computed):
     assert not meshcat.HasPath(PLANE)
     show_regions(meshcat, None, set())
     assert not meshcat.HasPath("workspaces")
-    assert regions.normals() == [0, 1, 2]
 
 
-def test_a_hull_and_proven_boxes_are_layers_too(tmp_path):
-    folder = tmp_path / "proven"
-    with pytest.raises(SystemExit):
-        main(["workspace", "acrobot_small", "--grid", "3,3,3", "--kind", "static",
-              "--hull", "0,0,0.3", "--rays", "100", "--certify", "--boxes", "400",
-              "--out", str(folder), "--json"])  # fmt: skip
-    told = json.loads((folder / "results.json").read_text())
-    regions, meshcat = read_regions(folder), open_meshcat()
+def test_a_hull_and_proven_boxes_are_layers_too(tmp_path, meshcat):
+    told, regions = computed_regions(
+        tmp_path / "proven", "workspace", "acrobot_small", "--kind=static", "--hull=0,0,0.3",
+        "--rays=100", "--certify", "--boxes=400",
+    )  # fmt: skip
     layers = {layer.name: layer for layer in regions.layers}
+    assert list(layers) == ["static", "hull", "boxes inside", "boxes open"]
     assert layers["hull"].volume == told["hull"]["volume_m3"]
     assert told["certified"]["outside_share"] == 0.0  # of so few boxes
-    assert list(layers) == ["static", "hull", "boxes inside", "boxes open"]
     for name in ("inside", "open"):
         layer = layers[f"boxes {name}"]
         assert layer.share == told["certified"][f"{name}_share"]
@@ -67,40 +75,34 @@ def test_a_hull_and_proven_boxes_are_layers_too(tmp_path):
     show_regions(meshcat, regions, {"boxes open"})
     assert meshcat.HasPath("workspaces/hull")
     assert meshcat.HasPath("workspaces/boxes open")
-    (folder / "boxes.npz").write_bytes(b"")
+    (tmp_path / "proven" / "boxes.npz").write_bytes(b"")
     with pytest.raises(CdprError, match=r"boxes.npz: found no boxes"):
-        read_regions(folder)
+        read_regions(tmp_path / "proven")
+
+
+def test_workspaces_of_stability_are_layers_and_their_margin_a_plane(tmp_path, meshcat):
+    told, regions = computed_regions(
+        tmp_path / "stable", "stability", "acrobot_small", "--verdict=sampled", "--draws=2"
+    )
+    (volumes,) = told["workspaces"]
+    assert [(layer.name, layer.volume) for layer in regions.layers] == [
+        (f"baseline {name}", volumes[name]["corners_m3"]) for name in ("SZ", "Z", "S")
+    ]
+    ((name, values),) = regions.values.items()
+    assert values.shape == (3, 3, 3)
+    draw_plane(meshcat, regions, Plane(name, 0, 2))
+    assert meshcat.HasPath(PLANE)
 
 
 def test_colours_of_a_plane_go_from_the_least_to_the_largest_value():
     colors = colors_of(np.array([1.0, 3.0, 2.0, np.nan, -np.inf]), (1.0, 3.0))
-    np.testing.assert_allclose(colors[0], rgb(TENSIONS[0]))
-    np.testing.assert_allclose(colors[1], rgb(TENSIONS[-1]))
-    np.testing.assert_allclose(colors[3:], [UNKNOWN, UNKNOWN])
     middle = (np.array(rgb(TENSIONS[3])) + rgb(TENSIONS[4])) / 2.0
-    np.testing.assert_allclose(colors[2], middle)
+    expected = [rgb(TENSIONS[0]), rgb(TENSIONS[-1]), middle, UNKNOWN, UNKNOWN]
+    np.testing.assert_allclose(colors, expected)
 
 
-@pytest.mark.parametrize(
-    "words", ["", "[]", "{}", '{"workspaces": 3}', "\xff", '{"workspaces": {}}']
-)
-def test_broken_results_are_one_message(tmp_path, words):
-    (tmp_path / "results.json").write_text(words, encoding="latin-1")
-    with pytest.raises(CdprError):
+@pytest.mark.parametrize("words", ["{}", '{"workspaces": 3}', '{"workspaces": []}'])
+def test_results_of_something_else_are_refused(tmp_path, words):
+    (tmp_path / "results.json").write_text(words)
+    with pytest.raises(CdprError, match="found no stored workspace"):
         read_regions(tmp_path)
-
-
-def test_workspaces_of_stability_are_layers_and_their_margin_a_plane(tmp_path):
-    folder = tmp_path / "stable"
-    with pytest.raises(SystemExit):
-        main(["stability", "acrobot_small", "--verdict", "sampled", "--draws", "2", "--grid",
-              "3,3,3", "--out", str(folder), "--json"])  # fmt: skip
-    (told,) = json.loads((folder / "results.json").read_text())["workspaces"]
-    regions, meshcat = read_regions(folder), open_meshcat()
-    assert [layer.name for layer in regions.layers] == ["baseline SZ", "baseline Z", "baseline S"]
-    for layer in regions.layers:
-        assert layer.volume == told[layer.name.split()[1]]["corners_m3"]
-    (name,) = regions.values
-    assert regions.values[name].shape == (3, 3, 3)
-    draw_plane(meshcat, regions, Plane(name, 0, 2))
-    assert meshcat.HasPath(PLANE)

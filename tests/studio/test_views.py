@@ -60,23 +60,18 @@ def test_broken_results_are_one_message(tmp_path, words):
 
 
 async def test_a_user_sees_verdicts_figures_and_files_and_nothing_in_them_is_run(study):
-    def page():
-        ui.label("A page")
-        ui.timer(0.0, lambda: show_results(study), once=True)
-
-    async with simulated(page) as user:
-        await until(lambda: shown(user, "figure"))
+    async with simulated(lambda: ui.timer(0.0, lambda: show_results(study), once=True)) as user:
+        await until(lambda: shown(user, "shown-figure"))
+        assert "image/svg+xml" in field(user, "shown-figure").content
         words = field(user, "statements").content
         assert "confirmed" in words
         assert "&lt;b&gt;says" in words
-        await until(lambda: shown(user, "shown-figure"))
-        assert "image/svg+xml" in field(user, "shown-figure").content
         field(user, "page-replay.html").value = True
         await until(lambda: shown(user, "result-page"))
         page = field(user, "result-page").props
         assert (page["srcdoc"], page["sandbox"]) == ("<p>moves</p>", "allow-scripts")
         user.find("All as a zip archive").click()
         sent = await user.download.next(timeout=1200.0)
-        with zipfile.ZipFile(io.BytesIO(sent.content)) as archive:  # which follows no link
-            names = {"results.json", "a.svg", "replay.html", ".hidden"}
-            assert {f"some/{name}" for name in names} == set(archive.namelist())
+    with zipfile.ZipFile(io.BytesIO(sent.content)) as archive:  # which follows no link
+        names = {"results.json", "a.svg", "replay.html", ".hidden"}
+        assert {f"some/{name}" for name in names} == set(archive.namelist())
