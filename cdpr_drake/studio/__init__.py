@@ -3,8 +3,8 @@
 `serve` starts it. `server` starts NiceGUI behind a `Door`, which asks for a cookie that whoever has
 the token gets, and tells sessions by it; Drake's Meshcat is relayed to the same address.
 `page` is the page, `panel` the table of its panels with what connects them to a workbench.
-`session` is what a browser session works on. `robot`, `pose`, `workspace`, `run`, `logs`, `studies`
-and `verb_panel` are the panels.
+`session` is what a browser session works on. `robot`, `pose`, `workspace`, `run`, `logs` and
+`verb_panel` are the panels.
 
 * `Workbench` has what all tabs of a session show: the robot, a pose, and what is computed there. It
   knows no page; what shows it subscribes to its events.

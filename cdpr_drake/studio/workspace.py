@@ -32,6 +32,7 @@ from cdpr_drake.studio.panel import WORKSPACES, show_errors
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import VerbPanel, Verbs
 from cdpr_drake.studio.views import View, read_numbers
+from cdpr_drake.workspaces.volume import WorkspaceVolume
 
 REGIONS, PLANE = "workspaces", "workspaces/plane"
 """Paths in the scene: of all solids, and of the plane with colours."""
@@ -49,19 +50,17 @@ class Layer(NamedTuple):
     Attributes:
         name: Of the workspace.
         title: What it is, in words.
+        share: Of the grid's volume, or of the poses that boxes fill, in words.
         volume: Of the cells whose corners are all inside, of the hull, or of the boxes, as the
-            command prints it; None of boxes that are proven for a range of orientations.
-        unit: Of the volume.
-        share: Of the grid's volume, or of the poses that boxes fill; None of a hull.
+            command prints it, in words.
         solid: Its mesh, which may have no triangle.
         color: Of the solid.
     """
 
     name: str
     title: str
-    volume: float | None
-    unit: str
-    share: float | None
+    share: str
+    volume: str
     solid: Mesh
     color: Rgba
 
@@ -119,42 +118,42 @@ def read_regions(folder: Path) -> Regions:
         result = load_stability(folder)
         for bounds, kind, *drawn in stability_solids(result):
             title = STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}")
-            volume = result.volume(kind, bounds=bounds)
-            measured = volume.value, volume.unit, volume.share
+            measured = _words(result.volume(kind, bounds=bounds))
             layers.append(Layer(f"{bounds} {kind}", title, *measured, *drawn))
         names = [f"margin, bounds {name}" for name in result.names]
-        values = dict(zip(names, result.margin, strict=True))
-        units = dict.fromkeys(names, "-")
+        values, units = dict(zip(names, result.margin, strict=True)), dict.fromkeys(names, "-")
     else:
         result = load_workspace(folder)
         for name, *drawn in workspace_solids(result):
-            title, volume = summary["workspaces"][name]["title"], result.volume(name)
-            measured = volume.value, volume.unit, volume.share
-            layers.append(Layer(name, title, *measured, *drawn))
-        values = result.values
-        units = {name: MEASURES[name].unit for name in values}
+            title = summary["workspaces"][name]["title"]
+            layers.append(Layer(name, title, *_words(result.volume(name)), *drawn))
+        values, units = result.values, {name: MEASURES[name].unit for name in result.values}
     if "hull" in summary:
         hull = load_hull(folder)
-        title = "what is seen of it from a centre, by rays"
-        layers.append(Layer("hull", title, hull.volume, "m^3", None, *hull_solid(hull)))
+        title, volume = "what is seen of it from a centre, by rays", f"{hull.volume:.4g} m^3"
+        layers.append(Layer("hull", title, "–", volume, *hull_solid(hull)))
     if "certified" in summary:
         layers += _box_layers(folder, bool(summary["certified"]["finished"]))
     least = {name: np.asarray(np.min(each, axis=0), float) for name, each in values.items()}
     return Regions(folder, str(summary["robot"]), result.grid.axes, layers, least, units)
 
 
+def _words(volume: WorkspaceVolume) -> tuple[str, str]:
+    return f"{100.0 * volume.share:.2f} %", f"{volume.value:.4g} {volume.unit}"
+
+
 def _box_layers(folder: Path, finished: bool) -> list[Layer]:
     """Boxes by what is proven of them."""
     boxes = load_boxes(folder, finished)
     sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
-    # Boxes of several orientations lie upon each other: what they fill is no volume of positions.
-    whole = None if np.any(sizes[3:] > 0.0) else float(np.prod(sizes[:3]))
     layers = []
-    for name, count, solid, color in box_solids(boxes):
-        share = float(getattr(boxes, name))
-        volume = None if whole is None else share * whole
+    for name, count, *drawn in box_solids(boxes):
         title = f"{'nothing is proven' if name == 'open' else f'proven {name}'}, {count}"
-        layers.append(Layer(f"boxes {name}", title, volume, "m^3", share, solid, color))
+        share = float(getattr(boxes, name))
+        volume = f"{share * np.prod(sizes[:3]):.4g} m^3"
+        if np.any(sizes[3:] > 0.0):  # of several orientations: they lie upon each other
+            volume = "–"
+        layers.append(Layer(f"boxes {name}", title, f"{100.0 * share:.2f} %", volume, *drawn))
     return layers
 
 
@@ -325,9 +324,8 @@ def _place_layer(layer: Layer, shown: Workspaces) -> None:
     style = f"display:inline-block;background:rgb({shade})"
     words = escape(f"{name}: {layer.title}")
     _cell("th", f'<span class="studio-swatch" style="{style}"></span> {words}')
-    _cell("td", "–" if layer.share is None else f"{100.0 * layer.share:.2f} %")
-    words = "–" if layer.volume is None else f"{layer.volume:.4g} {layer.unit}"
-    _cell("td", words).mark(f"volume-{name}")
+    _cell("td", layer.share)
+    _cell("td", layer.volume).mark(f"volume-{name}")
 
 
 def _place_plane(regions: Regions, shown: Workspaces) -> None:
