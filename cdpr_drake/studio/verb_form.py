@@ -24,13 +24,11 @@ from cdpr_drake.studio.folder import WorkingFolder
 PLACES = ("--out", "--overwrite")
 """Options that say where results go, which the studio does."""
 
-MOST_OPEN = 6
-"""Options that are shown unfolded where a panel does not say which."""
+MOST_OPEN, LONGEST_REFUSAL = 6, 400
+"""Options that are shown unfolded where a panel does not say which, and characters of a refusal
+beside a field."""
 
 YES, NO = "yes", "no"
-
-LONGEST_REFUSAL = 400
-"""Characters of a refusal beside a field."""
 
 Filled = dict[str, dict[str, str | bool]]
 """What was filled into forms, by verb and option; it outlives the page."""

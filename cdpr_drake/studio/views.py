@@ -28,11 +28,8 @@ from cdpr_drake.studio.panel import show_errors
 FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
 """Types of the figures that a page shows, by their endings."""
 
-MOST_ROWS, MOST_COLUMNS = 60, 12
-"""Of a table that is shown; the file has all."""
-
-MOST_FILES = 200
-"""Files that are listed."""
+MOST_ROWS, MOST_COLUMNS, MOST_FILES = 60, 12, 200
+"""Of a table that is shown, whose file has all; and files that are listed."""
 
 LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 """Sizes of numbers that are read, and of a figure or page that is shown [bytes]."""
@@ -40,10 +37,9 @@ LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts; other verdicts are grey."""
 
-WHOLE = "max-width: 100%; background: white"
-"""Style of a figure that is as wide as the page."""
-
 BADGE = "white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem"
+WHOLE = "max-width: 100%; background: white"
+"""Styles of a verdict, and of a figure that is as wide as the page."""
 
 Leaf = int | float | str | None
 Words = tuple[list[str], list[list[str]]]
@@ -264,16 +260,12 @@ async def show_results(folder: Path) -> None:
 def _statements(statements: list[dict[str, str]]) -> str:
     """Verdicts in their colours, in front of what they are about."""
     heads = ("verdict", "the source says", "printed", "found", "remark")
-    rows = [
-        [row.get(key, "") for key in ("verdict", "words", "printed", "found", "why")]
-        for row in statements
-    ]
-    html = plain_table(heads, rows)
-    for verdict in {row[0] for row in rows}:
-        cell, words = '<th scope="row">', escape(verdict)
-        shade = SHADES.get(verdict, "#606060")
+    keys = ("verdict", "words", "printed", "found", "why")
+    html = plain_table(heads, [[row.get(key, "") for key in keys] for row in statements])
+    for verdict in {row.get("verdict", "") for row in statements}:
+        words, shade = escape(verdict), SHADES.get(verdict, "#606060")
         badge = f'<b style="{BADGE};background:{shade}">{words}</b>'
-        html = html.replace(f"{cell}{words}</th>", f"{cell}{badge}</th>")
+        html = html.replace(f'<th scope="row">{words}</th>', f'<th scope="row">{badge}</th>')
     return html
 
 
@@ -322,24 +314,17 @@ async def _shown(path: Path) -> bytes:
     Raises:
         CdprError: It is too large for a page.
     """
-
-    def read() -> bytes:
-        if path.stat().st_size > LARGEST_SHOWN:
-            raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
-        return path.read_bytes()
-
-    return await run.io_bound(read) or b""
+    if path.stat().st_size > LARGEST_SHOWN:
+        raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
+    return await run.io_bound(path.read_bytes) or b""
 
 
 async def send_file(path: Path) -> None:
     """Hands over a file to the browser, or a folder as a zip archive; another thread reads it."""
-
-    def read() -> tuple[bytes, str]:
+    with show_errors():
         if not path.exists():
             raise CdprError(f"{path.name}: is not there any more")
-        return (zipped(path), ".zip") if path.is_dir() else (path.read_bytes(), "")
-
-    with show_errors():
-        content = await run.io_bound(read)
+        read, ending = (zipped, ".zip") if path.is_dir() else (Path.read_bytes, "")
+        content = await run.io_bound(read, path)
         if content is not None:  # the server is not ending
-            ui.download(content[0], path.name + content[1])
+            ui.download(content, path.name + ending)

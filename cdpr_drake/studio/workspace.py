@@ -211,6 +211,7 @@ class Workspaces(Verbs):
         regions: What was computed; None: nothing is shown.
         visible: Names of the layers that are shown.
         plane: The coloured plane; None: there is none.
+        in_scene: The regions, if the scene shows the robot that they are of; else None.
     """
 
     folder, result, names = "workspaces", WORKSPACES, ("workspace", "stability")
@@ -230,13 +231,8 @@ class Workspaces(Verbs):
         self.regions: Regions | None = None
         self.visible: set[str] = set()
         self.plane: Plane | None = None
-        self._in_scene: Regions | None = None
+        self.in_scene: Regions | None = None
         bench.results.changed.subscribe(self._follow, unsubscribe_on_delete=False)
-
-    @property
-    def is_hidden(self) -> bool:
-        """True if the scene shows another robot than the one that the regions are of."""
-        return self.regions is not None and self._in_scene is None
 
     async def show(self, view: View) -> None:
         """Places what may be switched on in the scene, then all else that there is."""
@@ -259,7 +255,7 @@ class Workspaces(Verbs):
 
     def show_plane(self, plane: Plane | None) -> None:
         """Puts the coloured plane elsewhere, or takes it away."""
-        self.plane, regions = plane, self._in_scene
+        self.plane, regions = plane, self.in_scene
         if regions is not None:
             self.bench.draw(lambda scene: draw_plane(scene.meshcat, regions, plane))
 
@@ -268,12 +264,12 @@ class Workspaces(Verbs):
         about = self.bench.results.subject(WORKSPACES)
         shown = self.bench.drawn or self.bench.subject
         regions = None if about is None or about.is_another(shown) else self.regions
-        if regions is not self._in_scene:
-            self._in_scene = regions
+        if regions is not self.in_scene:
+            self.in_scene = regions
             self._draw()
 
     def _draw(self) -> None:
-        regions, visible, plane = self._in_scene, set(self.visible), self.plane
+        regions, visible, plane = self.in_scene, set(self.visible), self.plane
 
         def draw(scene: Any) -> None:
             show_regions(scene.meshcat, regions, visible)
@@ -289,8 +285,9 @@ def workspace_panel(bench: Workbench) -> None:
     note = ui.label().classes("studio-soft").mark("regions-note")
 
     def say_hidden() -> None:
-        note.set_visibility(shown.is_hidden)
-        robot = "" if shown.regions is None else shown.regions.robot
+        regions = None if shown.in_scene else shown.regions
+        note.set_visibility(regions is not None)
+        robot = "" if regions is None else regions.robot
         note.text = f"The workspaces are not in the scene, which does not show that {robot}."
 
     VerbPanel(shown)
@@ -299,33 +296,30 @@ def workspace_panel(bench: Workbench) -> None:
 
 
 def _place_layers(regions: Regions, shown: Workspaces) -> None:
+    def cell(tag: str, html: str) -> ui.html:
+        return ui.html(html, sanitize=False, tag=tag)
+
     with ui.element("table").classes("studio-facts").props('aria-label="Workspaces"'):
         with ui.element("thead"), ui.element("tr"):
             for words in ("shown", "workspace", "share", "volume"):
-                _cell("th", words)
+                cell("th", words)
         with ui.element("tbody"):
             for layer in regions.layers:
+                name, color = layer.name, layer.color
+                shade = ",".join(str(round(255 * x)) for x in (color.r(), color.g(), color.b()))
+                style = f"display:inline-block;background:rgb({shade})"
+                words = escape(f"{name}: {layer.title}")
                 with ui.element("tr"):
-                    _place_layer(layer, shown)
-
-
-def _cell(tag: str, html: str) -> ui.html:
-    return ui.html(html, sanitize=False, tag=tag)
-
-
-def _place_layer(layer: Layer, shown: Workspaces) -> None:
-    name, color = layer.name, layer.color
-    with ui.element("td"):
-        box = ui.switch(value=name in shown.visible)
-        box.props(f'dense aria-label="show {escape(name)}"').mark(f"layer-{name}")
-        box.set_enabled(len(layer.solid[1]) > 0)
-        box.on_value_change(lambda event: shown.show_layer(name, bool(event.value)))
-    shade = ",".join(str(round(255 * part)) for part in (color.r(), color.g(), color.b()))
-    style = f"display:inline-block;background:rgb({shade})"
-    words = escape(f"{name}: {layer.title}")
-    _cell("th", f'<span class="studio-swatch" style="{style}"></span> {words}')
-    _cell("td", layer.share)
-    _cell("td", layer.volume).mark(f"volume-{name}")
+                    with ui.element("td"):
+                        box = ui.switch(value=name in shown.visible)
+                        box.props(f'dense aria-label="show {escape(name)}"').mark(f"layer-{name}")
+                        box.set_enabled(len(layer.solid[1]) > 0)
+                        box.on_value_change(
+                            lambda event, name=name: shown.show_layer(name, bool(event.value))
+                        )
+                    cell("th", f'<span class="studio-swatch" style="{style}"></span> {words}')
+                    cell("td", layer.share)
+                    cell("td", layer.volume).mark(f"volume-{name}")
 
 
 def _place_plane(regions: Regions, shown: Workspaces) -> None:
