@@ -16,19 +16,8 @@ from tests.studio.pages import field, in_scene, open_panel, problems, shown, unt
 
 ROBOT, OTHER = "acrobot_small", "planar"
 
-RESULTS = {
-    "robot": (), "pose": ("pose-numbers",), "workspace": ("workspaces",),
-    "run": ("run", "compared"), "logs": ("log",), "studies": ("study",), "commands": ("answer",),
-}  # fmt: skip
-"""Results of each panel; a panel that is new has to be here, and be marked."""
-
 CHOSEN = {"run": ("run", "first"), "compared": ("compare", "second")}
 """Results that are shown once a field has a value."""
-
-
-def test_all_panels_say_which_results_they_show():
-    shows = {name: set(panel.results) for name, panel in PANELS.items()}
-    assert shows == {name: set(results) for name, results in RESULTS.items()}
 
 
 @pytest.fixture(scope="module")
@@ -63,32 +52,30 @@ def make_heavier(bench):
     bench.robot.change(with_value(bench.robot.text, ("platform", "mass"), 5.25))
 
 
-@pytest.mark.parametrize(
-    ("panel", "name"), [(panel, name) for panel in RESULTS for name in RESULTS[panel]]
-)
-async def test_a_result_is_marked_when_the_robot_or_the_pose_has_changed(
-    user, bench, panel, name, monkeypatch
-):
-    def said():
-        return field(user, f"about-{name}").text
+async def test_results_are_marked_when_the_robot_or_the_pose_has_changed(user, bench, monkeypatch):
+    shows = [(panel, name) for panel in PANELS for name in PANELS[panel].results]
+    for panel, name in shows:
+        await show(user, bench, panel, name)
 
-    await show(user, bench, panel, name)
-    if name == "study":
-        await until(lambda: "robots of their own" in said())
-        return
-    await until(lambda: said() == "")
+    def said():
+        return {name: field(user, f"about-{name}").text for _, name in shows if name != "study"}
+
+    assert "robots of their own" in field(user, "about-study").text
+    await until(lambda: not any(said().values()))
     # As while numbers are being computed.
     monkeypatch.setattr(bench, "ask", bench.results.changed.emit)
-    make_heavier(bench)
-    assert f"of {ROBOT} as it was before" in said()
-    bench.robot.undo()
-    assert said() == ""
-    bench.open(OTHER)
-    assert f"of {ROBOT}, not of {OTHER}" in said()
-    bench.robot.undo()
-    assert said() == ""
+    for change, words in (
+        (lambda: make_heavier(bench), f"of {ROBOT} as it was before"),
+        (lambda: bench.open(OTHER), f"of {ROBOT}, not of {OTHER}"),
+    ):
+        change()
+        assert [name for name, remark in said().items() if words not in remark] == []
+        bench.robot.undo()
+        assert not any(said().values())
     bench.move_to([value + 0.01 for value in bench.coordinates])
-    assert ("of the pose before" in said()) == (name == "pose-numbers")
+    assert [name for name, remark in said().items() if "of the pose before" in remark] == [
+        "pose-numbers"
+    ]
 
 
 async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, bench, work):
