@@ -166,15 +166,10 @@ class VerbForm:
         self, verb: Verb, filled: Filled, folder: WorkingFolder, files: Sequence[str], *,
         first: Sequence[str] = (), without: Sequence[str] = (),
     ) -> None:  # fmt: skip
-        """Places them.
+        """Places them, with what was `filled` in before, and is from now on.
 
-        Args:
-            verb: The verb.
-            filled: What was filled in before, and is from now on.
-            folder: Where files are.
-            files: Names of those that are offered beside names of the package.
-            first: Keys of options that are shown unfolded; none: what is required, and some more.
-            without: Keys of options that have no input, since the panel gives their values.
+        Of the folder `files` are offered beside names of the package. Options of the keys `first`
+        are shown unfolded; none: some. Those of the keys `without` have no input.
         """
         self.verb, self._folder, self._files = verb, folder, files
         self._values = filled.setdefault(verb.name, {})
@@ -182,13 +177,12 @@ class VerbForm:
         places = [name.lstrip("-") for name in PLACES] if verb.writes_folder else []
         options = {key: o for key, o in verb.options.items() if key not in {*places, *without}}
         needed = [key for key, o in options.items() if o.argument.required or not o.is_named]
-        shown = list(dict.fromkeys([*needed, *(first or list(options)[:MOST_OPEN])]))
-        folded = [key for key in options if key not in shown]
-        self._place([options[key] for key in shown])
-        if folded:
+        unfolded = dict.fromkeys([*needed, *(first or list(options)[:MOST_OPEN])])
+        self._place({key: options.pop(key) for key in unfolded})
+        if options:
             more = ui.expansion("More options").classes("w-full studio-group").mark("more-options")
             with more:
-                self._place([options[key] for key in folded])
+                self._place(options)
 
     async def words(self, given: Mapping[str, str]) -> list[str]:
         """The command line with what is filled in and given; another thread parses it.
@@ -215,10 +209,9 @@ class VerbForm:
             field.error = refusal[:LONGEST_REFUSAL]
         return field is not None
 
-    def _place(self, options: Sequence[Option]) -> None:
+    def _place(self, options: Mapping[str, Option]) -> None:
         with ui.element("div").classes("studio-form"):
-            for option in options:
-                key = option.key
+            for key, option in options.items():
                 ui.label(key.replace("-", " ")).classes("studio-label")
                 made = self._input(option, self._values.get(key, option.default))
                 made.classes("w-full").mark(f"{self.verb.title}-{key}")

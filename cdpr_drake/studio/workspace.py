@@ -100,11 +100,6 @@ class Regions:
         values = self.values[name][np.isfinite(self.values[name])]
         return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
 
-    def normals(self) -> list[int]:
-        """Axes along which a plane may be moved: the other two have an extent."""
-        sizes = [len(axis) for axis in self.axes]
-        return [k for k in range(3) if all(sizes[j] > 1 for j in range(3) if j != k)]
-
 
 def read_regions(folder: Path) -> Regions:
     """Reads the results of `cdpr workspace` or `cdpr stability`.
@@ -324,7 +319,8 @@ def _place_layers(regions: Regions, shown: Workspaces) -> None:
 
 def _place_plane(regions: Regions, shown: Workspaces) -> None:
     """A plane across the grid, coloured by a measure."""
-    normals = regions.normals()
+    sizes = [len(axis) for axis in regions.axes]
+    normals = [k for k in range(3) if min(sizes[:k] + sizes[k + 1 :]) > 1]  # what is across extends
     if not regions.values or not normals:
         return
     plane = shown.plane or Plane(NOTHING, 2 if 2 in normals else normals[0], -1)
@@ -335,14 +331,14 @@ def _place_plane(regions: Regions, shown: Workspaces) -> None:
         axes = {k: AXES[k] for k in normals}
         across = ui.select(axes, value=plane.along, label="normal to")
         across.props("dense outlined").classes("w-24").mark("plane-along")
-    last = len(regions.axes[plane.along]) - 1
+    last = sizes[plane.along] - 1
     where = ui.slider(min=0, max=last, value=plane.index if plane.index >= 0 else last // 2)
     where.props('aria-label="place of the plane"').mark("plane-index")
     legend = ui.html("", sanitize=False).classes("w-full").mark("plane-legend")
 
     def follow() -> None:
         along, is_seen = int(across.value), what.value != NOTHING
-        last = len(regions.axes[along]) - 1
+        last = sizes[along] - 1
         where.props(f"max={last}").set_visibility(is_seen)
         chosen = Plane(str(what.value), along, min(int(where.value), last)) if is_seen else None
         legend.content = "" if chosen is None else _legend(regions, chosen)

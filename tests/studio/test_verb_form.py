@@ -119,16 +119,16 @@ async def test_an_option_of_a_new_type_has_its_input_and_words_at_once(folder):
     def parsed(line):
         app.parse_args(line[1:], exit_on_error=False, print_error=False)
         if "--colours=blue" in line:
-            raise CdprError("never; see cdpr new --help")
+            raise CdprError(f"{'' if '--far' in line else '--hue: '}never; see cdpr new --help")
 
     app, forms = App(), []
     app.default(verb)
     arguments = partial(app.assemble_argument_collection, parse_docstring=True)
     new = Verb("new", "", arguments, parsed)
     async with simulated(lambda: forms.append(VerbForm(new, {}, folder, []))) as user:
-        hue, colours = field(user, "new-hue"), field(user, "new-colours")
+        hue, colours, far = (field(user, f"new-{key}") for key in ("hue", "colours", "far"))
         assert (hue.props["hint"], colours.options) == ("Hue of it", ["red", "blue"])
-        hue.value, field(user, "new-far").value = "hue 12", True
+        hue.value, far.value = "hue 12", True
         assert await forms[0].words({}) == ["new", "--hue=hue 12", "--far"]
         for wrong in ("red", "r" * 5000):
             hue.value = wrong
@@ -138,4 +138,9 @@ async def test_an_option_of_a_new_type_has_its_input_and_words_at_once(folder):
         hue.value, colours.value = "", "blue"
         with pytest.raises(CdprError, match=r"^never$"):  # no field can say it
             await forms[0].words({})
+        far.value = False
+        assert await forms[0].words({}) == []
+        assert hue.error == "--hue: never"
+        colours.value = "red"
+        assert await forms[0].words({}) == ["new"]
         assert hue.error is None

@@ -17,8 +17,7 @@ from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.studio.folder import WorkingFolder
-from cdpr_drake.studio.logs import Logs, log_contents, log_files, read_comparison
+from cdpr_drake.studio.logs import Logs, read_comparison
 from cdpr_drake.studio.views import read_results
 from cdpr_drake.studio.workspace import (
     UNKNOWN,
@@ -168,32 +167,25 @@ def test_colours_of_a_plane_go_from_the_least_to_the_largest_value():
     np.testing.assert_allclose(colors, expected)
 
 
-async def test_a_robot_that_is_not_saved_is_not_asked_about(user, bench):
-    open_panel(user, "workspace")
-    await until(lambda: shown(user, "workspace-grid"))
-    bench.robot.change(bench.robot.text + "\n# changed\n")
-    user.find(marker="start-workspaces").click()
-    await until(lambda: problems(user))
-    assert "save it" in problems(user)[-1]
-    assert bench.jobs.jobs == []
-
-
-async def test_wrong_values_are_said_at_their_fields_by_form_and_by_command(user, bench):
+async def test_wrong_values_and_robots_are_refused_by_form_and_by_command(user, bench):
     open_panel(user, "workspace")
     await until(lambda: shown(user, "workspace-force"))
-    for key, value in (("force", "much"), ("grid", "five")):
-        cell = field(user, f"workspace-{key}")
-        cell.value = value
+    force, grid = field(user, "workspace-force"), field(user, "workspace-grid")
+    for cell, words in ((force, "--force: found 'much'"), (grid, "--grid: found 'five'")):
+        cell.value = words.split("'")[1]
         user.find(marker="start-workspaces").click()
         await until(lambda cell=cell: cell.error)
-        assert f"--{key}: found '{value}'" in cell.error
+        assert words in cell.error
         cell.value = ""
+    bench.robot.change(bench.robot.text + "\n# changed\n")
+    user.find(marker="start-workspaces").click()
+    await until(lambda: any("save it" in words for words in problems(user)))
     assert bench.jobs.jobs == []
-    field(user, "workspace-force").value = "-1"  # which the verb refuses, not the parser
+    bench.robot.undo()
+    force.value = "-1"  # which the verb refuses, not the parser
     job = await press_start(user, bench, "workspaces")
-    await until(lambda: field(user, "workspace-force").error)
-    assert job.state == "failed"
-    assert field(user, "workspace-grid").error is None
+    await until(lambda: force.error)
+    assert (job.state, grid.error) == ("failed", None)
 
 
 @pytest.mark.parametrize(
@@ -273,16 +265,6 @@ async def test_studies_are_a_gallery_with_verdicts_and_files_and_nothing_in_them
         assert {f"some/{name}" for name in names} == set(archive.namelist())
 
 
-def test_logs_of_the_folder_and_of_runs_have_the_contents_of_the_front_door(work):
-    assert log_files(WorkingFolder(work)) == ["notes.txt", "wrong.csv", "runs/short/log.csv"]
-    (view, picture), log = log_contents(work / "wrong.csv"), import_log(work / "wrong.csv")
-    assert dict(view.facts)["rows gaps"] == "1"
-    heads, rows = next(table for title, table in view.tables.items() if "columns" in title)
-    assert heads == ["columns", "rows", "least", "largest"]
-    assert [row[0] for row in rows] == list(log.frame)
-    assert picture.startswith(b"\x89PNG")
-
-
 def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
     charts, end, rows = read_comparison(beside)
     columns = 1 + sum(len(chart.series) for chart in charts)
@@ -300,11 +282,15 @@ def test_a_comparison_has_the_rows_of_the_table(tmp_path, beside):
 async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, bench, work, beside):
     open_panel(user, "logs")
     await until(lambda: shown(user, "logs-empty"))
-    field(user, "log").value = "notes.txt"
+    log = field(user, "log")
+    assert log.options == ["notes.txt", "wrong.csv", "runs/short/log.csv"]
+    log.value = "notes.txt"
     await until(lambda: any("notes.txt" in words for words in problems(user)))
-    field(user, "log").value = "wrong.csv"
+    log.value = "wrong.csv"
     await until(lambda: says(user, "table-Numbers", "rows gaps</th><td>1<"))
-    assert says(user, "table-columns", "C8_length_m")
+    for name in import_log(work / "wrong.csv").frame:
+        assert says(user, "table-columns", f">{name}<")
+    assert says(user, "shown-figure", "image/png")
     await press_start(user, bench, "logs")
     await until(lambda: bench.results.subject("log") is not None)
     assert bench.results.subject("log").digest == bench.subject.digest
