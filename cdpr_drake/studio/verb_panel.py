@@ -290,5 +290,5 @@ def _place_card(view: View, panel: VerbPanel) -> None:
             first = next(iter(view.figures.values()))
             place_figure(first, "height: 7rem; width: 100%; object-fit: contain")
         ui.label(name).classes("studio-title")
-        for words in filter(None, (view.verdicts() or "no statements to judge", view.remarks())):
+        for words in filter(None, (view.verdicts or "no statements to judge", view.remarks)):
             ui.label(words).classes("studio-soft")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from html import escape
@@ -30,6 +31,9 @@ FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
 
 MOST_ROWS, MOST_COLUMNS, MOST_FILES = 60, 12, 200
 """Of a table that is shown, whose file has all; and files that are listed."""
+
+REMARKS = {"interrupted": "stopped before its end", "quick": "short form"}
+"""What limits results, by keys that are true."""
 
 LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 """Sizes of numbers that are read, and of a figure or page that is shown [bytes]."""
@@ -57,7 +61,10 @@ class View:
         tables: Headings and rows of words, by title.
         folder: Their folder; None: there is none.
         files: Its files here and one folder below, but hidden ones and links out of the folder.
+        figures: Those that are shown as images.
         robot: Name of the robot that they are about; empty: they do not say.
+        remarks: What limits the results, in words; empty: nothing.
+        verdicts: How many statements got each verdict; empty: there are none.
     """
 
     def __init__(
@@ -73,30 +80,19 @@ class View:
         self.facts = [(name, _words(value)) for name, value in leaves(rest)]
         self.tables = dict(_table(key, rows, most_rows) for key, rows in tables.items())
         self.folder, self.files = folder, {} if folder is None else _files(folder)
+        images = [name for name, path in self.files.items() if path.suffix.lower() in FIGURES]
+        self.figures = {name: self.files[name] for name in images}
         robot = data.get("robot")
         self.robot = robot if isinstance(robot, str) else ""
-
-    @property
-    def figures(self) -> dict[str, Path]:
-        """Files that are shown as images."""
-        return {name: path for name, path in self.files.items() if path.suffix.lower() in FIGURES}
-
-    def remarks(self) -> str:
-        """What limits the results, in words; empty: nothing."""
-        words = {"interrupted": "stopped before its end", "quick": "short form"}
-        return ", ".join(
-            words[name] for name, value in self.facts if name in words and value == "yes"
-        )
-
-    def verdicts(self) -> str:
-        """How many statements got each verdict; empty: there are none."""
-        verdicts = [statement.get("verdict", "") for statement in self.statements]
-        return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
+        limits = [key for key in data if key in REMARKS and data[key] is True]
+        self.remarks = ", ".join(REMARKS[key] for key in limits)
+        counts = Counter(statement.get("verdict", "") for statement in self.statements)
+        self.verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
 
     def place(self, unfolded: bool = False) -> None:
         """Places it into the current slot, with its numbers unfolded or folded."""
-        if self.remarks():
-            ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
+        if self.remarks:
+            ui.label(f"These results: {self.remarks}.").classes("studio-soft")
         if self.statements:
             html = _statements(self.statements)
             ui.html(html, sanitize=False).classes("w-full").mark("statements")

@@ -82,17 +82,19 @@ def test_words_that_no_form_makes_are_refused(folder, name, word):
 
 
 async def test_inputs_have_the_choices_and_defaults_of_the_declarations(folder):
+    filled = {"workspace": {"kind": "static,closed", "robot": "mine.yaml"}}  # before
+
     def page():
-        VerbForm(ALL["workspace"], {}, folder, ["mine.yaml"])
-        VerbForm(ALL["check"], {}, folder, [])
+        for name in ("workspace", "check"):
+            VerbForm(ALL[name], filled, folder, ["mine.yaml"])
 
     async with simulated(page) as user:
-        kind, method, scenario, rays, pulleys = (
+        kind, method, scenario, rays, pulleys, robot = (
             field(user, f"workspace-{key}")
-            for key in ("kind", "method", "scenario", "rays", "pulleys")
+            for key in ("kind", "method", "scenario", "rays", "pulleys", "robot")
         )
-        assert kind.multiple
-        assert "static" in kind.options
+        assert (kind.value, robot.value) == (["static"], "mine.yaml")
+        assert "wrench-feasible" in kind.options
         assert "mine.yaml" in scenario.options
         assert "mine.yaml" not in method.options
         assert (rays.props["placeholder"], pulleys.value) == ("10000", True)

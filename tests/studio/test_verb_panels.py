@@ -223,8 +223,8 @@ def test_a_folder_has_facts_verdicts_tables_and_files(work):
         ("study", "some"), ("quick", "yes"), ("spread [m]", "1.25"), ("rows done", "3"),
         ("rows of", "4"), ("parts a x", "1"), ("parts b y", "2"),
     ]  # fmt: skip
-    assert results.verdicts() == "1 confirmed, 1 in part"
-    assert results.remarks() == "short form"
+    assert results.verdicts == "1 confirmed, 1 in part"
+    assert results.remarks == "short form"
     heads, rows = results.tables["runs, the first 60 of 100 rows"]
     assert (heads, len(rows), rows[-1]) == (["seed"], 60, ["59"])
     cables = results.tables["cables, 2 rows"]
