@@ -20,7 +20,7 @@ from cdpr_drake.studio.panel import ANSWER, STUDY, notify, robot_argument, show_
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_form import Filled, VerbForm
-from cdpr_drake.studio.views import View, place_figure, read_behind, read_results
+from cdpr_drake.studio.views import View, place_figure, read_behind, read_numbers
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""
@@ -203,7 +203,8 @@ class VerbPanel:
         if entry is None:
             return
         with self._body, show_errors():
-            view = await read_behind(lambda: read_results(entry.folder))
+            folder = entry.folder
+            view = await read_behind(lambda: View(read_numbers(folder), folder))
             if view is not None:
                 await self._verbs.show(view)
                 robot = view.robot or entry.about.get("robot", "")
@@ -275,7 +276,7 @@ def _readable(folders: list[Path]) -> list[View]:
     views = []
     for folder in folders:
         with suppress(CdprError):
-            views.append(read_results(folder))
+            views.append(View(read_numbers(folder), folder))
     return views
 
 

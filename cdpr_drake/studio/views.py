@@ -150,15 +150,6 @@ def read_numbers(folder: Path) -> dict[str, Any]:
     return data
 
 
-def read_results(folder: Path) -> View:
-    """Reads what a command left in a folder.
-
-    Raises:
-        CdprError: Its numbers cannot be read.
-    """
-    return View(read_numbers(folder), folder)
-
-
 def leaves(
     value: Mapping[str, Any], before: str = "", unit: str = ""
 ) -> Iterator[tuple[str, Leaf]]:
@@ -248,7 +239,7 @@ async def read_behind(read: Callable[[], T]) -> T | None:
 async def show_results(folder: Path) -> None:
     """Places what a command left in a folder into the current slot, or says what is wrong."""
     with show_errors():
-        view = await read_behind(lambda: read_results(folder))
+        view = await read_behind(lambda: View(read_numbers(folder), folder))
         if view is not None:
             view.place()
 

@@ -18,7 +18,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio.logs import Logs, read_comparison
-from cdpr_drake.studio.views import read_results
+from cdpr_drake.studio.views import View, read_numbers
 from cdpr_drake.studio.workspace import (
     UNKNOWN,
     Plane,
@@ -218,7 +218,8 @@ async def test_a_command_leaves_its_answer_and_its_files(
 
 
 def test_a_folder_has_facts_verdicts_tables_and_files(work):
-    results = read_results(work / "studies" / "some")
+    folder = work / "studies" / "some"
+    results = View(read_numbers(folder), folder)
     assert results.facts == [
         ("study", "some"), ("quick", "yes"), ("spread [m]", "1.25"), ("rows done", "3"),
         ("rows of", "4"), ("parts a x", "1"), ("parts b y", "2"),
@@ -234,8 +235,8 @@ def test_a_folder_has_facts_verdicts_tables_and_files(work):
 
 @pytest.mark.parametrize(
     ("read", "words", "refusal"),
-    [(read_results, "", "results.json: "), (read_results, "[]", "results.json: "),
-     (read_results, "\xff", "results.json: "), (read_results, "[" * 100_000, "results.json: "),
+    [(read_numbers, "", "results.json: "), (read_numbers, "[]", "results.json: "),
+     (read_numbers, "\xff", "results.json: "), (read_numbers, "[" * 100_000, "results.json: "),
      (read_regions, "{}", "found no stored workspace"),
      (read_regions, '{"workspaces": 3}', "found no stored workspace"),
      (read_regions, '{"workspaces": []}', "found no stored workspace")],
