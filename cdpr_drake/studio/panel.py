@@ -60,8 +60,8 @@ PANELS = {
         {RUN: "The run that is shown", COMPARED: "The run behind it"},
     ),
     "logs": Panel("Logs", "timeline", "logs:logs_panel", {LOG: "The comparison"}),
-    "studies": Panel("Studies", "science", "studies:studies_panel", {STUDY: "Studies"}),
-    "commands": Panel("Commands", "terminal", "commands:commands_panel", {ANSWER: "The answer"}),
+    "studies": Panel("Studies", "science", "verb_panel:studies_panel", {STUDY: "Studies"}),
+    "commands": Panel("Commands", "terminal", "verb_panel:commands_panel", {ANSWER: "The answer"}),
 }  # fmt: skip
 """Panels by name, in the order of their tabs."""
 

@@ -1,120 +1,90 @@
 """A panel of verbs: the form of one, its start, and the results that there are of all.
 
-The tabs Workspace, Logs, Studies and Commands are such panels.
+The panels Workspace, Logs, Studies and Commands are such; the latter two are here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from weakref import WeakKeyDictionary
+from typing import ClassVar
 
 from nicegui import run, ui
 
+from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.jobs import Job, JobState
-from cdpr_drake.studio.panel import notify, robot_argument, show_errors
+from cdpr_drake.studio.panel import ANSWER, STUDY, notify, robot_argument, show_errors
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.verb_form import FieldProblem, Filled, VerbForm
-from cdpr_drake.studio.views import View, read_results
+from cdpr_drake.studio.verb_form import Filled, VerbForm
+from cdpr_drake.studio.views import View, place_figure, read_behind, read_numbers
 
 TICK = 0.5
 """Time between looks at jobs and folders [s]."""
 
-ROBOT = "robot"
-"""The option that the open robot is given to, where a verb needs one."""
+MOST_IN_GALLERY = 24
+"""Studies in the gallery, the newest."""
 
 
-@dataclass(frozen=True)
-class VerbTab:
-    """What a panel of verbs is about.
+class Verbs:
+    """What a session sees of a panel of verbs, in all its tabs of the browser.
 
     Attributes:
         folder: Folder of its results in the working folder; also of its marks.
         result: Name of what it shows among `Workbench.results`.
         empty: What is said where there is no result yet.
-        verbs: Names of its verbs; empty: all that there are.
+        names: Of its verbs; empty: all that there are.
         first: Keys of options that are shown unfolded, by verb.
         start: Words of the button.
-    """
-
-    folder: str
-    result: str
-    empty: str
-    verbs: tuple[str, ...] = ()
-    first: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    start: str = "Start"
-
-
-class VerbView:
-    """What a session sees of a panel of verbs, in all its tabs.
-
-    Attributes:
         board: Commands and their results.
         filled: What was filled into the forms.
         verb: Name of the verb whose form is shown.
     """
 
-    def __init__(self, bench: Workbench, tab: VerbTab) -> None:
-        """For a workbench."""
-        self.board = Board(bench.jobs, bench.folder.root, tab.folder)
+    folder: ClassVar[str]
+    result: ClassVar[str]
+    empty: ClassVar[str]
+    names: ClassVar[Sequence[str]] = ()
+    first: ClassVar[Mapping[str, Sequence[str]]] = {}
+    start: ClassVar[str] = "Start"
+
+    def __init__(self, bench: Workbench) -> None:
+        """For a workbench, which keeps it."""
+        self.bench = bench
+        self.board = Board(bench.jobs, bench.folder.root, self.folder)
         self.filled: Filled = {}
-        self.verb = next(iter(tab.first or tab.verbs or bench.commands))
+        self.verb = next(iter(self.first or self.names or bench.commands))
 
+    def given(self) -> dict[str, str]:
+        """Values of options beside those of the form, by key, which has no inputs for them."""
+        return {}
 
-_views: WeakKeyDictionary[Workbench, dict[str, VerbView]] = WeakKeyDictionary()
-
-
-def view_of(bench: Workbench, tab: VerbTab) -> VerbView:
-    """What a session sees of a tab, as long as it has a workbench."""
-    views = _views.setdefault(bench, {})
-    return views.setdefault(tab.folder, VerbView(bench, tab))
+    async def show(self, view: View) -> None:
+        """Places results into the current slot."""
+        view.place()
 
 
 class VerbPanel:
     """The panel in one tab of a browser."""
 
-    def __init__(
-        self, bench: Workbench, tab: VerbTab, *,
-        given: Callable[[], Mapping[str, str]] = dict,
-        show: Callable[[View], Awaitable[None] | None] = View.place,
-    ) -> None:  # fmt: skip
-        """Places it into the current slot.
-
-        Args:
-            bench: The workbench.
-            tab: What it is about.
-            given: Values of options beside those of the form, by key, which then has no inputs for
-                them; called when the form is placed, and when the verb starts.
-            show: Places results into the current slot.
-        """
-        self._bench, self._tab, self.view = bench, tab, view_of(bench, tab)
-        self._given, self._show = given, show
+    def __init__(self, verbs: Verbs) -> None:
+        """Places it into the current slot."""
+        self._verbs, self._bench, self._board = verbs, verbs.bench, verbs.board
         self._form: VerbForm | None = None
         self._job: Job | None = None
         self._shown: tuple[Path | None, float] = None, 0.0
-        self._verbs = {name: bench.commands[name] for name in tab.verbs or bench.commands}
-        titles = {name: f"{name}: {verb.line}" for name, verb in self._verbs.items()}
+        commands, mark = self._bench.commands, verbs.folder
+        titles = {name: f"{name}: {commands[name].line}" for name in verbs.names or commands}
         with ui.row().classes("w-full items-center no-wrap"):
-            choice = ui.select(titles, value=self.view.verb, label="what", with_input=not tab.verbs)
-            choice.props("dense outlined").classes("col").mark(f"verb-{tab.folder}")
+            choice = ui.select(titles, value=verbs.verb, label="what", with_input=not verbs.names)
+            choice.props("dense outlined").classes("col").mark(f"verb-{mark}")
             choice.set_visibility(len(titles) > 1)
-            self.start = ui.button(tab.start, icon="play_circle", on_click=self._start)
-            self.start.props("no-caps").mark(f"start-{tab.folder}")
+            self.start = ui.button(verbs.start, icon="play_circle", on_click=self._start)
+            self.start.props("no-caps").mark(f"start-{mark}")
         self._fields = ui.element("div").classes("w-full")
-        self._place_bar()
-        self._empty = ui.label(tab.empty).classes("studio-empty").mark(f"{tab.folder}-empty")
-        self._body = ui.element("div").classes("w-full").mark(f"{tab.folder}-shown")
-        choice.on_value_change(lambda: self._place_form(choice.value))
-        ui.timer(0.0, lambda: self._place_form(self.view.verb), once=True)
-        ui.timer(TICK, self._tick)
-
-    def _place_bar(self) -> None:
-        """Which results are looked at, how far the command is, and what it may be asked for."""
-        mark = self._tab.folder
         with ui.row().classes("w-full items-center no-wrap"):
             self._choice = ui.select({}, label="results", on_change=self._choose)
             self._choice.props("dense outlined").classes("col").mark(f"{mark}-results")
@@ -125,74 +95,74 @@ class VerbPanel:
             self._go_on.mark(f"{mark}-continue")
         self._progress = ui.linear_progress(show_value=False).props("size=8px")
         self._state = ui.label().classes("studio-soft").props('role="status"').mark(f"{mark}-state")
+        self._empty = ui.label(verbs.empty).classes("studio-empty").mark(f"{mark}-empty")
+        self._body = ui.element("div").classes("w-full").mark(f"{mark}-shown")
+        choice.on_value_change(lambda: self._place_form(choice.value))
+        ui.timer(0.0, lambda: self._place_form(verbs.verb), once=True)
+        ui.timer(TICK, self._tick)
 
     async def _place_form(self, name: str | None) -> None:
         """Imports a verb in another thread, and places its form."""
         if not name:
             return
-        self.view.verb, self._form, verb = name, None, self._verbs[name]
-        folder = self._bench.folder
+        verbs, folder = self._verbs, self._bench.folder
+        verbs.verb, self._form, verb = name, None, self._bench.commands[name]
         self._fields.clear()
         with self._fields, show_errors():
-            sign = ui.spinner()
-            read = await run.io_bound(lambda: (verb.options, folder.files((".yaml", ".yml"))))
-            if read is None or name != self.view.verb:  # the server is ending, or another verb
-                return
-            options, files = read
-            sign.delete()
-            needed = [ROBOT] if ROBOT in options and options[ROBOT].required else []
-            self._form = VerbForm(
-                verb, self.view.filled, folder, files,
-                first=self._tab.first.get(name, ()), without=[*needed, *self._given()],
-            )  # fmt: skip
+            read = await read_behind(lambda: (verb.options, folder.files((".yaml", ".yml"))))
+            if read is not None:
+                without = [*verbs.given(), *(["robot"] if verb.needs_robot else [])]
+                self._form = VerbForm(
+                    verb, verbs.filled, folder, read[1],
+                    first=verbs.first.get(name, ()), without=without,
+                )  # fmt: skip
 
     async def _start(self) -> None:
-        with show_errors(), suppress(FieldProblem):  # which a field says
+        with show_errors():
             if self._form is None:
                 return
-            form, bench, given, about = self._form, self._bench, dict(self._given()), {}
+            verb, given, about = self._form.verb, self._verbs.given(), {}
             names = [_stem(value) for value in given.values()]
-            if ROBOT in form.verb.options and form.verb.options[ROBOT].required:
-                given[ROBOT], now = robot_argument(bench), bench.subject
+            if verb.needs_robot:
+                given["robot"], now = robot_argument(self._bench), self._bench.subject
                 about = {"robot": now.robot, "digest": now.digest}
                 names.append(now.robot)
-            words = await form.words(given)
-            if len(self._tab.verbs) != 1:
-                names.append(form.verb.title)
-            name = "-".join(names) or _stem(words[-1])
-            self._job = await self.view.board.start(form.verb, words, name, about)
-            self._refresh()
+            if words := await self._form.words(given):
+                if len(self._verbs.names) != 1:
+                    names.append(verb.title)
+                name = "-".join(names) or _stem(words[-1])
+                self._job = await self._board.start(verb, words, name, about)
+                self._refresh()
 
     def _choose(self) -> None:
-        if self._choice.value and self._choice.value != self.view.board.shown:
+        if self._choice.value and self._choice.value != self._board.shown:
             self.open(str(self._choice.value))
 
     def open(self, key: str) -> None:
         """Looks at the results of a key."""
-        self.view.board.shown = key
+        self._board.shown = key
         self._refresh()
 
     def _ask_to_stop(self) -> None:
-        entry = self.view.board.shown_entry()
+        entry = self._board.shown_entry()
         if entry is not None and entry.job is not None:
             entry.job.stop()
         self._refresh()
 
     async def _ask_to_go_on(self) -> None:
         with show_errors():
-            entry = self.view.board.shown_entry()
+            entry = self._board.shown_entry()
             if entry is not None:
-                await self.view.board.go_on(entry, self._verbs, self._bench.folder)
+                await self._board.go_on(entry, self._bench.commands, self._bench.folder)
             self._refresh()
 
     def _refresh(self) -> Entry | None:
         """Follows jobs and folders; returns what is looked at."""
-        board = self.view.board
-        entry = board.shown_entry()
-        names = {key: one.name for key, one in board.choices().items()}
+        entry = self._board.shown_entry()
+        names = {key: one.name for key, one in self._board.choices().items()}
         if names != self._choice.options:
-            self._choice.set_options(names, value=board.shown or None)
-        self._choice.value = board.shown or None
+            self._choice.set_options(names)
+        self._choice.value = self._board.shown or None
         job = None if entry is None else entry.job
         working = job is not None and not job.state.is_over
         self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)
@@ -228,23 +198,98 @@ class VerbPanel:
     async def _place_results(self, entry: Entry | None) -> None:
         """Reads results in another thread, places them, and says what they are about."""
         self._body.clear()
-        self._bench.results.show(self._tab.result, None)
+        results, name = self._bench.results, self._verbs.result
+        results.show(name, None)
         if entry is None:
             return
         with self._body, show_errors():
-            sign = ui.spinner(size="lg")
-            view = await run.io_bound(read_results, entry.folder)
-            if view is None or sign.is_deleted:  # the server is ending, or others are shown
-                return
-            sign.delete()
-            placed = self._show(view)
-            if placed is not None:
-                await placed
-            robot = view.robot or entry.about.get("robot", "")
-            self._bench.results.show(self._tab.result, Subject(robot, entry.digest(robot)))
+            folder = entry.folder
+            view = await read_behind(lambda: View(read_numbers(folder), folder))
+            if view is not None:
+                await self._verbs.show(view)
+                robot = view.robot or entry.about.get("robot", "")
+                results.show(name, Subject(robot, entry.digest(robot)))
 
 
 def _stem(word: str) -> str:
     """What a file or a word is called, as a part of a folder's name."""
     path = Path(word.rpartition("=")[2])
     return path.parent.name if path.stem == "log" and path.parent.name else path.stem
+
+
+class Commands(Verbs):
+    """Any verb with its form, and what it leaves."""
+
+    folder, result = "commands", ANSWER
+    first: ClassVar = {"tension": ("pose", "method", "pulleys", "wrench")}
+    empty = (
+        "No result yet. Choose a question and press Start; a command about a robot takes the open "
+        "one."
+    )
+
+    async def show(self, view: View) -> None:
+        """Places results with their numbers unfolded."""
+        view.place(unfolded=True)
+
+
+def commands_panel(bench: Workbench) -> None:
+    """Places the panel of all commands."""
+    VerbPanel(bench.kept(Commands))
+
+
+class Studies(Verbs):
+    """Studies, and what they found."""
+
+    folder, result, names = "studies", STUDY, ("study",)
+    first: ClassVar = {"study": ("quick", "seeds")}
+    empty = (
+        "No study yet. Choose one and press Start; quick takes a short form of it. Statements with "
+        "their verdicts, tables and figures come here. A study that is stopped keeps its finished "
+        "rows, and can be continued."
+    )
+
+
+def studies_panel(bench: Workbench) -> None:
+    """Places the studies panel."""
+    studies = bench.kept(Studies)
+    panel = VerbPanel(studies)
+    placed: list[tuple[Path, float]] = []
+    with ui.expansion("Finished studies in the working folder", value=True) as fold:
+        gallery = ui.row().classes("w-full")
+    fold.classes("w-full studio-group")
+
+    async def follow() -> None:
+        whole = [one for one in studies.board.choices().values() if one.is_whole]
+        stamp = [(one.folder, one.changed) for one in whole[:MOST_IN_GALLERY]]
+        if stamp != placed:
+            placed[:] = stamp
+            views = await run.io_bound(_readable, [folder for folder, _ in stamp])
+            with gallery.clear(), show_errors():
+                for view in views or ():
+                    _place_card(view, panel)
+
+    ui.timer(TICK, follow)
+
+
+def _readable(folders: list[Path]) -> list[View]:
+    """The results in those folders that can be read."""
+    views = []
+    for folder in folders:
+        with suppress(CdprError):
+            views.append(View(read_numbers(folder), folder))
+    return views
+
+
+def _place_card(view: View, panel: VerbPanel) -> None:
+    assert view.folder is not None
+    name = view.folder.name
+    with ui.card().props("flat bordered").style("width: 14rem; cursor: pointer") as card:
+        card.props(f'tabindex=0 role="button" aria-label="Show {name}"').mark(f"card-{name}")
+        for event in ("click", "keydown.enter", "keydown.space"):
+            card.on(event, partial(panel.open, name))
+        if view.figures:
+            first = next(iter(view.figures.values()))
+            place_figure(first, "height: 7rem; width: 100%; object-fit: contain")
+        ui.label(name).classes("studio-title")
+        for words in filter(None, (view.verdicts or "no statements to judge", view.remarks)):
+            ui.label(words).classes("studio-soft")

@@ -1,6 +1,6 @@
 """Results of any command in the page: verdicts, tables, numbers, figures, pages and files.
 
-`show_results(folder)` shows what a folder has of these, `View.of(data)` numbers alone. Nothing in a
+`show_results(folder)` shows what a folder has of these, `View(data)` numbers alone. Nothing in a
 file is run with the rights of the page: words are escaped, figures are images, pages are in a
 sandbox.
 """
@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import base64
 import zipfile
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from html import escape
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from nicegui import run, ui
 
@@ -29,11 +29,11 @@ from cdpr_drake.studio.panel import show_errors
 FIGURES = {".png": "image/png", ".svg": "image/svg+xml"}
 """Types of the figures that a page shows, by their endings."""
 
-MOST_ROWS, MOST_COLUMNS = 60, 12
-"""Of a table that is shown; the file has all."""
+MOST_ROWS, MOST_COLUMNS, MOST_FILES = 60, 12, 200
+"""Of a table that is shown, whose file has all; and files that are listed."""
 
-MOST_FILES = 200
-"""Files that are listed."""
+REMARKS = {"interrupted": "stopped before its end", "quick": "short form"}
+"""What limits results, by keys that are true."""
 
 LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 """Sizes of numbers that are read, and of a figure or page that is shown [bytes]."""
@@ -41,17 +41,17 @@ LARGEST_RESULTS, LARGEST_SHOWN = 64_000_000, 8_000_000
 SHADES = {"confirmed": "#1b7f4f", "in part": "#a86200", "not confirmed": "#c01010"}
 """Behind the words of verdicts; other verdicts are grey."""
 
-WHOLE = "max-width: 100%; background: white"
-"""Style of a figure that is as wide as the page."""
-
 BADGE = "white-space:nowrap;color:#ffffff;border-radius:3px;padding:0 0.3rem"
+WHOLE = "max-width: 100%; background: white"
+"""Styles of a verdict, and of a figure that is as wide as the page."""
 
 Leaf = int | float | str | None
 Words = tuple[list[str], list[list[str]]]
 """Headings, and rows of words."""
 
+T = TypeVar("T")
 
-@dataclass(frozen=True)
+
 class View:
     """What a page shows of results.
 
@@ -61,54 +61,38 @@ class View:
         tables: Headings and rows of words, by title.
         folder: Their folder; None: there is none.
         files: Its files here and one folder below, but hidden ones and links out of the folder.
+        figures: Those that are shown as images.
         robot: Name of the robot that they are about; empty: they do not say.
+        remarks: What limits the results, in words; empty: nothing.
+        verdicts: How many statements got each verdict; empty: there are none.
     """
 
-    facts: list[tuple[str, str]]
-    statements: list[dict[str, str]]
-    tables: dict[str, Words]
-    folder: Path | None = None
-    files: Mapping[str, Path] = field(default_factory=dict)
-    robot: str = ""
-
-    @classmethod
-    def of(
-        cls, data: Mapping[str, Any], folder: Path | None = None, most_rows: int = MOST_ROWS
-    ) -> View:
+    def __init__(
+        self, data: Mapping[str, Any], folder: Path | None = None, most_rows: int = MOST_ROWS
+    ) -> None:
         """Of a command's numbers as JSON with so many rows of its tables, and perhaps its files."""
         tables = {key: rows for key, value in data.items() if (rows := _rows(key, value))}
-        statements = [
+        self.statements = [
             {str(key): _words(value) for key, value in row.items()}
             for row in tables.pop("statements", ())
         ]
         rest = {key: value for key, value in data.items() if key not in tables}
-        facts = [(name, _words(value)) for name, value in leaves(rest)]
-        shown = dict(_table(key, rows, most_rows) for key, rows in tables.items())
-        files = {} if folder is None else _files(folder)
+        self.facts = [(name, _words(value)) for name, value in leaves(rest)]
+        self.tables = dict(_table(key, rows, most_rows) for key, rows in tables.items())
+        self.folder, self.files = folder, {} if folder is None else _files(folder)
+        images = [name for name, path in self.files.items() if path.suffix.lower() in FIGURES]
+        self.figures = {name: self.files[name] for name in images}
         robot = data.get("robot")
-        return cls(facts, statements, shown, folder, files, robot if isinstance(robot, str) else "")
-
-    @property
-    def figures(self) -> dict[str, Path]:
-        """Files that are shown as images."""
-        return {name: path for name, path in self.files.items() if path.suffix.lower() in FIGURES}
-
-    def remarks(self) -> str:
-        """What limits the results, in words; empty: nothing."""
-        words = {"interrupted": "stopped before its end", "quick": "short form"}
-        return ", ".join(
-            words[name] for name, value in self.facts if name in words and value == "yes"
-        )
-
-    def verdicts(self) -> str:
-        """How many statements got each verdict; empty: there are none."""
-        verdicts = [statement.get("verdict", "") for statement in self.statements]
-        return ", ".join(f"{verdicts.count(one)} {one}" for one in dict.fromkeys(verdicts))
+        self.robot = robot if isinstance(robot, str) else ""
+        limits = [key for key in data if key in REMARKS and data[key] is True]
+        self.remarks = ", ".join(REMARKS[key] for key in limits)
+        counts = Counter(statement.get("verdict", "") for statement in self.statements)
+        self.verdicts = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
 
     def place(self, unfolded: bool = False) -> None:
         """Places it into the current slot, with its numbers unfolded or folded."""
-        if self.remarks():
-            ui.label(f"These results: {self.remarks()}.").classes("studio-soft")
+        if self.remarks:
+            ui.label(f"These results: {self.remarks}.").classes("studio-soft")
         if self.statements:
             html = _statements(self.statements)
             ui.html(html, sanitize=False).classes("w-full").mark("statements")
@@ -138,23 +122,22 @@ class View:
         place = ui.element("div").classes("w-full")
 
         def show() -> None:
-            place.clear()
-            with place:
+            with place.clear():
                 place_figure(self.figures[str(chosen.value)])
 
         chosen.on_value_change(show)
         show()
 
 
-def read_results(folder: Path) -> View:
-    """Reads what a command left in a folder.
+def read_numbers(folder: Path) -> dict[str, Any]:
+    """Numbers that a command left in a folder, as JSON; empty: it has not finished there.
 
     Raises:
-        CdprError: Its numbers cannot be read.
+        CdprError: They cannot be read.
     """
     path = numbers_file(folder)
     if path is None:
-        return View.of({}, folder)
+        return {}
     name = f"{folder.name}: {path.name}"
     try:
         if path.stat().st_size > LARGEST_RESULTS:
@@ -164,7 +147,7 @@ def read_results(folder: Path) -> View:
         raise CdprError(f"{name}: cannot be read: {problem}") from problem
     if not isinstance(data, dict):
         raise CdprError(f"{name}: found no results of a command")
-    return View.of(data, folder)
+    return data
 
 
 def leaves(
@@ -239,33 +222,37 @@ def zipped(folder: Path) -> bytes:
     return file.getvalue()
 
 
-async def show_results(folder: Path) -> None:
-    """Places what a command left in a folder into the current slot, which shows a sign meanwhile.
+async def read_behind(read: Callable[[], T]) -> T | None:
+    """What another thread reads, which the current slot shows a sign of meanwhile.
 
-    It is read in another thread. What cannot be read is a message in the page.
+    None if nobody waits for it any more: the server is ending, or the slot shows something else.
     """
     sign = ui.spinner(size="lg")
+    try:
+        value = await run.io_bound(read)
+        return None if sign.is_deleted else value
+    finally:
+        if not sign.is_deleted:
+            sign.delete()
+
+
+async def show_results(folder: Path) -> None:
+    """Places what a command left in a folder into the current slot, or says what is wrong."""
     with show_errors():
-        view = await run.io_bound(read_results, folder)
-        if view is not None and not sign.is_deleted:  # the server is not ending, the place is there
+        view = await read_behind(lambda: View(read_numbers(folder), folder))
+        if view is not None:
             view.place()
-    if not sign.is_deleted:
-        sign.delete()
 
 
 def _statements(statements: list[dict[str, str]]) -> str:
     """Verdicts in their colours, in front of what they are about."""
     heads = ("verdict", "the source says", "printed", "found", "remark")
-    rows = [
-        [row.get(key, "") for key in ("verdict", "words", "printed", "found", "why")]
-        for row in statements
-    ]
-    html = plain_table(heads, rows)
-    for verdict in {row[0] for row in rows}:
-        cell, words = '<th scope="row">', escape(verdict)
-        shade = SHADES.get(verdict, "#606060")
+    keys = ("verdict", "words", "printed", "found", "why")
+    html = plain_table(heads, [[row.get(key, "") for key in keys] for row in statements])
+    for verdict in {row.get("verdict", "") for row in statements}:
+        words, shade = escape(verdict), SHADES.get(verdict, "#606060")
         badge = f'<b style="{BADGE};background:{shade}">{words}</b>'
-        html = html.replace(f"{cell}{words}</th>", f"{cell}{badge}</th>")
+        html = html.replace(f'<th scope="row">{words}</th>', f'<th scope="row">{badge}</th>')
     return html
 
 
@@ -314,24 +301,17 @@ async def _shown(path: Path) -> bytes:
     Raises:
         CdprError: It is too large for a page.
     """
-
-    def read() -> bytes:
-        if path.stat().st_size > LARGEST_SHOWN:
-            raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
-        return path.read_bytes()
-
-    return await run.io_bound(read) or b""
+    if path.stat().st_size > LARGEST_SHOWN:
+        raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
+    return await run.io_bound(path.read_bytes) or b""
 
 
 async def send_file(path: Path) -> None:
     """Hands over a file to the browser, or a folder as a zip archive; another thread reads it."""
-
-    def read() -> tuple[bytes, str]:
+    with show_errors():
         if not path.exists():
             raise CdprError(f"{path.name}: is not there any more")
-        return (zipped(path), ".zip") if path.is_dir() else (path.read_bytes(), "")
-
-    with show_errors():
-        content = await run.io_bound(read)
+        read, ending = (zipped, ".zip") if path.is_dir() else (Path.read_bytes, "")
+        content = await run.io_bound(read, path)
         if content is not None:  # the server is not ending
-            ui.download(content[0], path.name + content[1])
+            ui.download(content, path.name + ending)

@@ -2,165 +2,325 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from html import escape
-from typing import Any
-from weakref import WeakKeyDictionary, ref
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from nicegui import run, ui
+from pydrake.geometry import Meshcat, Rgba
 
-from cdpr_drake.palette import TENSIONS
+from cdpr_drake.analyses.visualization.solids import add_solid
+from cdpr_drake.analyses.workspaces.conditions import MEASURES
+from cdpr_drake.analyses.workspaces.servo_stability import KINDS as STABILITY_KINDS
+from cdpr_drake.analyses.workspaces.stability import load_stability
+from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
+from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
+from cdpr_drake.analyses.workspaces.workspace_scene import (
+    Mesh,
+    hull_solid,
+    stability_solids,
+    workspace_solids,
+)
+from cdpr_drake.arrays import Array
+from cdpr_drake.palette import TENSIONS, rgb
+from cdpr_drake.proofs.box_figures import box_solids
+from cdpr_drake.proofs.certified_workspace import load_boxes
 from cdpr_drake.studio.panel import WORKSPACES, show_errors
-from cdpr_drake.studio.regions import Layer, Plane, Regions, draw_plane, read_regions, show_regions
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.verb_panel import VerbPanel, VerbTab
-from cdpr_drake.studio.views import View
+from cdpr_drake.studio.verb_panel import VerbPanel, Verbs
+from cdpr_drake.studio.views import View, read_numbers
+from cdpr_drake.workspaces.volume import WorkspaceVolume
 
-TAB = VerbTab(
-    folder="workspaces", result=WORKSPACES, verbs=("workspace", "stability"),
-    first={
-        "workspace": ("kind", "measure", "grid", "orientation"),
-        "stability": ("scheme", "verdict", "grid", "orientation"),
-    },
-    empty="No workspace yet. Choose what the cables must hold (kind) or what is measured at each "
-    "pose (measure), then press Start: the open robot is taken, and the result is drawn in the "
-    "scene.",
-)  # fmt: skip
+REGIONS, PLANE = "workspaces", "workspaces/plane"
+"""Paths in the scene: of all solids, and of the plane with colours."""
+
+UNKNOWN = (0.6, 0.6, 0.6)
+"""Colour of poses without a finite value."""
 
 AXES = "xyz"
 NOTHING = "none"
 
 
-class RegionView:
-    """What a session sees of a workspace that was computed, in all its tabs and in its scene.
+class Layer(NamedTuple):
+    """One workspace that can be shown.
+
+    Attributes:
+        name: Of the workspace.
+        title: What it is, in words.
+        share: Of the grid's volume, or of the poses that boxes fill, in words.
+        volume: Of the cells whose corners are all inside, of the hull, or of the boxes, as the
+            command prints it, in words.
+        solid: Its mesh, which may have no triangle.
+        color: Of the solid.
+    """
+
+    name: str
+    title: str
+    share: str
+    volume: str
+    solid: Mesh
+    color: Rgba
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Where a coloured plane stands: name of its values, axis 0 to 2 that it is normal to, and
+    number of the grid's plane along that axis."""
+
+    name: str
+    along: int
+    index: int
+
+
+@dataclass(frozen=True, eq=False)
+class Regions:
+    """What a results folder has.
+
+    Attributes:
+        folder: The folder.
+        robot: Name of the robot.
+        axes: Coordinates of the grid, shape (n,) each [m].
+        layers: Workspaces.
+        values: Least value over the orientations by name, shape (nx, ny, nz).
+        units: Of the values.
+    """
+
+    folder: Path
+    robot: str
+    axes: tuple[Array, Array, Array]
+    layers: list[Layer]
+    values: dict[str, Array]
+    units: dict[str, str]
+
+    def range(self, name: str) -> tuple[float, float]:
+        """Least and largest finite value; NaN where there is none."""
+        values = self.values[name][np.isfinite(self.values[name])]
+        return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+
+
+def read_regions(folder: Path) -> Regions:
+    """Reads the results of `cdpr workspace` or `cdpr stability`.
+
+    Raises:
+        CdprError: There are none that can be read.
+    """
+    summary, layers = read_numbers(folder), []
+    result: Any
+    if isinstance(summary.get("workspaces"), list):
+        result = load_stability(folder)
+        for bounds, kind, *drawn in stability_solids(result):
+            title = STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}")
+            measured = _words(result.volume(kind, bounds=bounds))
+            layers.append(Layer(f"{bounds} {kind}", title, *measured, *drawn))
+        names = [f"margin, bounds {name}" for name in result.names]
+        values, units = dict(zip(names, result.margin, strict=True)), dict.fromkeys(names, "-")
+    else:
+        result = load_workspace(folder)
+        for name, *drawn in workspace_solids(result):
+            title = summary["workspaces"][name]["title"]
+            layers.append(Layer(name, title, *_words(result.volume(name)), *drawn))
+        values, units = result.values, {name: MEASURES[name].unit for name in result.values}
+    if "hull" in summary:
+        hull = load_hull(folder)
+        title, volume = "what is seen of it from a centre, by rays", f"{hull.volume:.4g} m^3"
+        layers.append(Layer("hull", title, "–", volume, *hull_solid(hull)))
+    if "certified" in summary:
+        layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+    least = {name: np.asarray(np.min(each, axis=0), float) for name, each in values.items()}
+    return Regions(folder, str(summary["robot"]), result.grid.axes, layers, least, units)
+
+
+def _words(volume: WorkspaceVolume) -> tuple[str, str]:
+    return f"{100.0 * volume.share:.2f} %", f"{volume.value:.4g} {volume.unit}"
+
+
+def _box_layers(folder: Path, finished: bool) -> list[Layer]:
+    """Boxes by what is proven of them."""
+    boxes = load_boxes(folder, finished)
+    sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
+    layers = []
+    for name, count, *drawn in box_solids(boxes):
+        title = f"{'nothing is proven' if name == 'open' else f'proven {name}'}, {count}"
+        share = float(getattr(boxes, name))
+        volume = f"{share * np.prod(sizes[:3]):.4g} m^3"
+        if np.any(sizes[3:] > 0.0):  # of several orientations: they lie upon each other
+            volume = "–"
+        layers.append(Layer(f"boxes {name}", title, f"{100.0 * share:.2f} %", volume, *drawn))
+    return layers
+
+
+def show_regions(meshcat: Meshcat, regions: Regions | None, visible: set[str]) -> None:
+    """Puts the solids of regions into a scene in the place of others; `visible` layers are seen.
+
+    Of None nothing is shown any more.
+    """
+    meshcat.Delete(REGIONS)
+    for layer in () if regions is None else regions.layers:
+        if len(layer.solid[1]):
+            path = f"{REGIONS}/{layer.name}"
+            add_solid(meshcat, path, *layer.solid, layer.color, visible=layer.name in visible)
+
+
+def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
+    """Puts the coloured plane into a scene, or takes it out."""
+    if plane is None:
+        meshcat.Delete(PLANE)
+        return
+    grid = np.stack(np.meshgrid(*regions.axes, indexing="ij"), axis=-1)
+    points, values = (
+        np.take(each, plane.index, plane.along) for each in (grid, regions.values[plane.name])
+    )
+    corner = np.arange(values.size).reshape(values.shape)
+    quads = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1)
+    faces = quads.reshape(-1, 4)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    colors = colors_of(values.ravel(), regions.range(plane.name))
+    meshcat.SetTriangleColorMesh(
+        PLANE, np.asfortranarray(points.reshape(-1, 3).T),
+        np.asfortranarray(faces.T.astype(np.int32)), np.asfortranarray(colors.T),
+    )  # fmt: skip
+    # Colours mean numbers: no shadow darkens them, nor a solid before them: they are drawn last.
+    for name in ("castShadow", "receiveShadow"):
+        meshcat.SetProperty(f"{PLANE}/<object>", name, False)
+    meshcat.SetProperty(f"{PLANE}/<object>", "material.transparent", True)
+    meshcat.SetProperty(f"{PLANE}/<object>", "renderOrder", 1.0)
+
+
+def colors_of(values: Array, span: tuple[float, float]) -> Array:
+    """Red, green, blue of values, shape (n, 3), from `palette.TENSIONS`; grey where not finite."""
+    low, high = span
+    shares = (values - low) / max(high - low, 1e-300)
+    table = np.array([rgb(color) for color in TENSIONS])
+    places = np.linspace(0.0, 1.0, len(table))
+    colors = np.column_stack([np.interp(shares, places, column) for column in table.T])
+    colors[~np.isfinite(shares)] = UNKNOWN
+    return colors
+
+
+class Workspaces(Verbs):
+    """Workspaces that were computed, in all tabs of a session and in its scene.
 
     Attributes:
         regions: What was computed; None: nothing is shown.
         visible: Names of the layers that are shown.
         plane: The coloured plane; None: there is none.
+        in_scene: The regions, if the scene shows the robot that they are of; else None.
     """
+
+    folder, result, names = "workspaces", WORKSPACES, ("workspace", "stability")
+    first: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "workspace": ("kind", "measure", "grid", "orientation"),
+        "stability": ("scheme", "verdict", "grid", "orientation"),
+    }
+    empty = (
+        "No workspace yet. Choose what the cables must hold (kind) or what is measured at each "
+        "pose (measure), then press Start: the open robot is taken, and the result is drawn in the "
+        "scene."
+    )
 
     def __init__(self, bench: Workbench) -> None:
         """For a workbench, with nothing in its scene."""
-        self._bench = ref(bench)  # which this is kept by
+        super().__init__(bench)
         self.regions: Regions | None = None
         self.visible: set[str] = set()
         self.plane: Plane | None = None
-        self._in_scene: Regions | None = None
+        self.in_scene: Regions | None = None
         bench.results.changed.subscribe(self._follow, unsubscribe_on_delete=False)
 
-    def _fitting(self) -> Regions | None:
-        """The regions, if the scene shows the robot that they are of."""
-        bench = self._bench()
-        about = None if bench is None else bench.results.subject(WORKSPACES)
-        if bench is None or about is None or about.is_another(bench.drawn or bench.subject):
-            return None
-        return self.regions
-
-    @property
-    def is_hidden(self) -> bool:
-        """True if the scene shows another robot than the one that the regions are of."""
-        return self.regions is not None and self._in_scene is None
-
-    def take(self, regions: Regions) -> None:
-        """Shows other regions, the first of them."""
-        if self.regions is None or regions.folder != self.regions.folder:
-            self.plane, self.visible = None, {layer.name for layer in regions.layers[:1]}
-        self.regions = regions
-
-    def _follow(self) -> None:
-        """Takes workspaces out of the scene of another robot, and puts them back."""
-        if self._fitting() is not self._in_scene:
-            self._draw_all()
-
-    def _draw_all(self) -> None:
-        regions = self._in_scene = self._fitting()
-        visible, plane, bench = set(self.visible), self.plane, self._bench()
-
-        def draw(scene: Any) -> None:
-            show_regions(scene.meshcat, regions, visible)
-            if regions is not None and plane is not None:
-                draw_plane(scene.meshcat, regions, plane)
-
-        if bench is not None:
-            bench.draw(draw)
+    async def show(self, view: View) -> None:
+        """Places what may be switched on in the scene, then all else that there is."""
+        folder = view.folder
+        assert folder is not None
+        with show_errors():
+            regions = await run.io_bound(read_regions, folder)
+            if regions is not None:  # the server is not ending
+                if self.regions is None or folder != self.regions.folder:
+                    self.plane, self.visible = None, {layer.name for layer in regions.layers[:1]}
+                self.regions = regions
+                _place_layers(regions, self)
+                _place_plane(regions, self)
+        view.place()
 
     def show_layer(self, name: str, visible: bool) -> None:
         """Shows a layer, or hides it."""
         (self.visible.add if visible else self.visible.discard)(name)
-        self._draw_all()
+        self._draw()
 
     def show_plane(self, plane: Plane | None) -> None:
         """Puts the coloured plane elsewhere, or takes it away."""
-        self.plane, regions, bench = plane, self._in_scene, self._bench()
-        if regions is not None and bench is not None:
-            bench.draw(lambda scene: draw_plane(scene.meshcat, regions, plane))
+        self.plane, regions = plane, self.in_scene
+        if regions is not None:
+            self.bench.draw(lambda scene: draw_plane(scene.meshcat, regions, plane))
 
+    def _follow(self) -> None:
+        """Takes workspaces out of the scene of another robot, and puts them back."""
+        about = self.bench.results.subject(WORKSPACES)
+        shown = self.bench.drawn or self.bench.subject
+        regions = None if about is None or about.is_another(shown) else self.regions
+        if regions is not self.in_scene:
+            self.in_scene = regions
+            self._draw()
 
-_views: WeakKeyDictionary[Workbench, RegionView] = WeakKeyDictionary()
-"""What each session sees, as long as it has a workbench."""
+    def _draw(self) -> None:
+        regions, visible, plane = self.in_scene, set(self.visible), self.plane
+
+        def draw(scene: Any) -> None:
+            show_regions(scene.meshcat, regions, visible)
+            if regions is not None:
+                draw_plane(scene.meshcat, regions, plane)
+
+        self.bench.draw(draw)
 
 
 def workspace_panel(bench: Workbench) -> None:
     """Places the workspace panel."""
-    if bench not in _views:
-        _views[bench] = RegionView(bench)
-    shown = _views[bench]
+    shown = bench.kept(Workspaces)
     note = ui.label().classes("studio-soft").mark("regions-note")
 
     def say_hidden() -> None:
-        note.set_visibility(shown.is_hidden)
-        robot = "" if shown.regions is None else shown.regions.robot
+        regions = None if shown.in_scene else shown.regions
+        note.set_visibility(regions is not None)
+        robot = "" if regions is None else regions.robot
         note.text = f"The workspaces are not in the scene, which does not show that {robot}."
 
-    async def show(view: View) -> None:
-        assert view.folder is not None
-        with show_errors():
-            regions = await run.io_bound(read_regions, view.folder)
-            if regions is not None:  # the server is not ending
-                shown.take(regions)
-                _place_layers(regions, shown)
-                _place_plane(regions, shown)
-        view.place()
-
-    VerbPanel(bench, TAB, show=show)
+    VerbPanel(shown)
     say_hidden()
     bench.results.changed.subscribe(say_hidden)
 
 
-def _place_layers(regions: Regions, shown: RegionView) -> None:
+def _place_layers(regions: Regions, shown: Workspaces) -> None:
+    def cell(tag: str, html: str) -> ui.html:
+        return ui.html(html, sanitize=False, tag=tag)
+
     with ui.element("table").classes("studio-facts").props('aria-label="Workspaces"'):
         with ui.element("thead"), ui.element("tr"):
             for words in ("shown", "workspace", "share", "volume"):
-                with ui.element("th"):
-                    ui.label(words)
+                cell("th", words)
         with ui.element("tbody"):
             for layer in regions.layers:
+                name, color = layer.name, layer.color
+                shade = ",".join(str(round(255 * x)) for x in (color.r(), color.g(), color.b()))
+                style = f"display:inline-block;background:rgb({shade})"
+                words = escape(f"{name}: {layer.title}")
                 with ui.element("tr"):
-                    _place_layer(layer, shown)
+                    with ui.element("td"):
+                        box = ui.switch(value=name in shown.visible)
+                        box.props(f'dense aria-label="show {escape(name)}"').mark(f"layer-{name}")
+                        box.set_enabled(len(layer.solid[1]) > 0)
+                        box.on_value_change(
+                            lambda event, name=name: shown.show_layer(name, bool(event.value))
+                        )
+                    cell("th", f'<span class="studio-swatch" style="{style}"></span> {words}')
+                    cell("td", layer.share)
+                    cell("td", layer.volume).mark(f"volume-{name}")
 
 
-def _place_layer(layer: Layer, shown: RegionView) -> None:
-    name, color = escape(layer.name), layer.color
-    shade = ",".join(str(round(255 * part)) for part in (color.r(), color.g(), color.b()))
-    swatch = f'<span class="studio-swatch" style="display:inline-block;background:rgb({shade})">'
-    with ui.element("td"):
-        box = ui.switch(value=layer.name in shown.visible)
-        box.props(f'dense aria-label="show {name}"').mark(f"layer-{layer.name}")
-        box.set_enabled(layer.solid is not None)
-        box.on_value_change(lambda event: shown.show_layer(layer.name, bool(event.value)))
-    with ui.element("th"):
-        ui.html(f"{swatch}</span> {name}: {escape(layer.title)}", sanitize=False)
-    with ui.element("td"):
-        ui.label("–" if layer.share is None else f"{100.0 * layer.share:.2f} %")
-    with ui.element("td"):
-        words = "–" if layer.volume is None else f"{layer.volume:.4g} {layer.unit}"
-        ui.label(words).mark(f"volume-{layer.name}")
-
-
-def _place_plane(regions: Regions, shown: RegionView) -> None:
+def _place_plane(regions: Regions, shown: Workspaces) -> None:
     """A plane across the grid, coloured by a measure."""
-    normals = regions.normals()
+    sizes = [len(axis) for axis in regions.axes]
+    normals = [k for k in range(3) if min(sizes[:k] + sizes[k + 1 :]) > 1]  # what is across extends
     if not regions.values or not normals:
         return
     plane = shown.plane or Plane(NOTHING, 2 if 2 in normals else normals[0], -1)
@@ -171,14 +331,14 @@ def _place_plane(regions: Regions, shown: RegionView) -> None:
         axes = {k: AXES[k] for k in normals}
         across = ui.select(axes, value=plane.along, label="normal to")
         across.props("dense outlined").classes("w-24").mark("plane-along")
-    last = len(regions.axes[plane.along]) - 1
+    last = sizes[plane.along] - 1
     where = ui.slider(min=0, max=last, value=plane.index if plane.index >= 0 else last // 2)
     where.props('aria-label="place of the plane"').mark("plane-index")
     legend = ui.html("", sanitize=False).classes("w-full").mark("plane-legend")
 
     def follow() -> None:
         along, is_seen = int(across.value), what.value != NOTHING
-        last = len(regions.axes[along]) - 1
+        last = sizes[along] - 1
         where.props(f"max={last}").set_visibility(is_seen)
         chosen = Plane(str(what.value), along, min(int(where.value), last)) if is_seen else None
         legend.content = "" if chosen is None else _legend(regions, chosen)

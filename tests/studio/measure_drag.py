@@ -13,31 +13,22 @@ moment (`still_ms`: the age of what the scene shows, once in each picture); and 
 of the hand to the refined workspace.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
-import tempfile
 import time
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
-from tests.chromium import chromium, complaints, wait_for
-from tests.studio.run_page import press
-from tests.studio.served import served
-
-CABLE = 1
-"""Number of the cable whose exit point is dragged."""
+from tests.chromium import complaints, wait_for
+from tests.studio.run_page import opened, press, text_of
 
 WATCH = """
 const viewer = document.getElementById('scene').contentWindow.viewer;
-const exit = '/drake/studio/exit/' + arguments[0];
 const told = window.dragTold = [], drawn = window.dragDrawn = [];
-let moved = 0;
+let moved = 0, place = null, waiting = [];
 document.getElementById('scene').contentWindow.addEventListener(
   'pointermove', () => moved = performance.now(), true);
 const emit = window.emitEvent;
@@ -45,7 +36,6 @@ window.emitEvent = (name, ...rest) => {
   if (name === 'studio_point') told.push({t: performance.now(), moved, at: rest[0].at});
   emit(name, ...rest);
 };
-let place = null, waiting = [];
 const render = viewer.render.bind(viewer);
 viewer.render = (...rest) => {
   render(...rest);
@@ -57,61 +47,53 @@ viewer.render = (...rest) => {
 const handle = viewer.handle_command.bind(viewer);
 viewer.handle_command = (command) => {
   handle(command);
-  if (command.type === 'set_transform' && command.path === exit)
+  if (command.type === 'set_transform' && command.path === '/drake/studio/exit/1')
     place = [...command.matrix].slice(12, 15);
-  if (command.type === 'set_object' && command.path === '/drake/studio_workspace') {
-    if (place) waiting.push({came: performance.now(), at: place});
-  }
+  if (command.type === 'set_object' && command.path === '/drake/studio_workspace' && place)
+    waiting.push({came: performance.now(), at: place});
 };
 """
 """Notes the places that are told to the server, and those that workspaces are drawn for."""
 
 PLACE = """
-const viewer = document.getElementById('scene').contentWindow.viewer;
+const scene = document.getElementById('scene'), viewer = scene.contentWindow.viewer;
 viewer.scene.updateMatrixWorld(true);
 viewer.camera.updateMatrixWorld(true);
-const object = viewer.scene_tree.find(['drake', 'studio', 'exit', String(arguments[0])]).object;
-const p = object.position.clone().setFromMatrixPosition(object.matrixWorld);
-p.project(viewer.camera);
-const frame = document.getElementById('scene').getBoundingClientRect();
-return [frame.left + (p.x + 1) / 2 * frame.width, frame.top + (1 - p.y) / 2 * frame.height];
+const point = viewer.scene_tree.find(['drake', 'studio', 'exit', '1']).object;
+const p = point.position.clone().setFromMatrixPosition(point.matrixWorld).project(viewer.camera);
+const frame = scene.getBoundingClientRect();
+return [Math.trunc(frame.left + (p.x + 1) / 2 * frame.width),
+        Math.trunc(frame.top + (1 - p.y) / 2 * frame.height)];
 """
-"""Where the exit point is in the page [px]."""
+"""Where the exit point of C2 is in the page [px]."""
 
 LISTENS = (
-    "document.getElementById('scene').contentWindow.viewer && "
-    "document.getElementById('scene').contentWindow.viewer.renderer.domElement.studioListens"
+    "document.getElementById('scene')?.contentWindow.viewer?.renderer?.domElement.studioListens"
 )
 
-SAME = 1e-3
-"""Places that differ by less are the same: the page tells all digits, the robot has four [m]."""
-
-STEP = 3
-"""Of the mouse between two events [px]."""
-
-PERIOD = 0.06
-"""Between two events of the mouse [s]."""
-
-REFINED = "document.querySelector('.studio-live').innerText.includes('refined')"
+STEP, PERIOD = 3, 0.06
+"""Of the mouse between two events [px] [s]."""
 
 
-def _same(event: dict, one: dict) -> bool:
-    """Whether a workspace is of the place that an event told."""
-    return bool(np.max(np.abs(np.subtract(event["at"], one["at"]))) < SAME)
+def matched(told, drawn):
+    """Each coarse workspace that was drawn, with the last event before it that told its place.
 
-
-def matched(told: list[dict], drawn: list[dict]) -> list[tuple[dict, dict]]:
-    """Each coarse workspace that was drawn, with the last event before it that told its place."""
+    The page tells all digits of places, the robot has four.
+    """
     pairs = []
     for one in drawn:
-        before = [event for event in told if event["t"] < one["came"] and _same(event, one)]
+        before = [
+            event
+            for event in told
+            if event["t"] < one["came"] and np.allclose(event["at"], one["at"], rtol=0.0, atol=1e-3)
+        ]
         # What comes once more for the same event is the refined workspace.
         if before and (not pairs or pairs[-1][0] is not before[-1]):
             pairs.append((before[-1], one))
     return pairs
 
 
-def ages(pairs: list[tuple[dict, dict]], told: list[dict]) -> np.ndarray:
+def ages(pairs, told):
     """How old what the scene shows is, just before each picture of a workspace [ms].
 
     Counted from the event after the one that is shown: until that the scene shows the newest.
@@ -121,61 +103,58 @@ def ages(pairs: list[tuple[dict, dict]], told: list[dict]) -> np.ndarray:
         newer = [event["t"] for event in told if event["t"] > shown["t"]]
         if newer and newer[0] < following["t"]:
             found.append(following["t"] - newer[0])
-    return np.array(found)
+    return found
 
 
-def percentiles(values: np.ndarray) -> dict[str, float]:
+def percentiles(values):
     """Median and 95 per cent."""
     return {"median": float(np.median(values)), "95": float(np.percentile(values, 95.0))}
 
 
-def main() -> None:
+def move(page, x, y):
+    """Moves the mouse by so many pixels."""
+    ActionChains(page, duration=0).move_by_offset(x, y).perform()
+
+
+def main():
     """Measures, and prints JSON."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--drags", type=int, default=150, help="events of the mouse")
     options.add_argument("--longest", type=float, default=600.0, help="time for them [s]")
     options.add_argument("--robot", default="acrobot_large")
     asked = options.parse_args()
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        tempfile.TemporaryDirectory() as profile,
-        chromium(Path(profile)) as page,
-        served(Path(folder), asked.robot) as (address, _),
-    ):
-        page.get(address)
+    live = text_of(".studio-live")
+    with opened(asked.robot) as page:
         press(page, "Robot")
-        wait_for(page, LISTENS)
-        wait_for(page, "document.querySelector('.studio-live').innerText.includes('limits')")
+        wait_for(page, f"{LISTENS} && {live}.includes('limits')")
         time.sleep(3.0)  # the camera turns to the robot
-        x, y = page.execute_script(PLACE, CABLE)
         hand = ActionBuilder(page, duration=0)
-        hand.pointer_action.move_to_location(int(x), int(y)).pointer_down()
+        hand.pointer_action.move_to_location(*page.execute_script(PLACE)).pointer_down()
         hand.perform()
-        ActionChains(page, duration=0).move_by_offset(-STEP, 0).perform()
-        wait_for(page, "document.querySelector('.studio-live').innerText.includes('grid')")
-        page.execute_script(WATCH, CABLE)
+        move(page, -STEP, 0)
+        wait_for(page, f"{live}.includes('grid')")
+        page.execute_script(WATCH)
         end = time.monotonic() + asked.longest
         for k in range(asked.drags):
             if time.monotonic() > end:
                 break
             there = -STEP if k // 20 % 2 == 0 else STEP
-            ActionChains(page, duration=0).move_by_offset(there, there // STEP).perform()
+            move(page, there, there // STEP)
             time.sleep(PERIOD)
         time.sleep(0.4)
         let_go = time.monotonic()
         ActionChains(page).release().perform()
         told, drawn = page.execute_script("return [window.dragTold, window.dragDrawn]")
-        wait_for(page, REFINED)
+        wait_for(page, f"{live}.includes('refined')")
         refined = time.monotonic() - let_go
         pairs = matched(told, drawn)
-        behind = np.array([one["t"] - event["moved"] for event, one in pairs])
         print(json.dumps({
             "robot": asked.robot,
             "events_told": len(told),
             "workspaces_drawn": len(pairs),
-            "behind_ms": percentiles(behind),
+            "behind_ms": percentiles([one["t"] - event["moved"] for event, one in pairs]),
             "still_ms": percentiles(ages(pairs, told)),
-            "to_message_ms": percentiles(np.array([d["came"] - e["moved"] for e, d in pairs])),
+            "to_message_ms": percentiles([one["came"] - event["moved"] for event, one in pairs]),
             "refined_after_letting_go_s": refined,
             "complaints": complaints(page),
         }, indent=2))  # fmt: skip

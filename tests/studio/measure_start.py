@@ -8,60 +8,52 @@ is not counted, until all panels have been loaded and the tensions at the pose a
 Printed as JSON, median and largest.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
 import statistics
 import tempfile
 from pathlib import Path
-from urllib.request import HTTPCookieProcessor, build_opener
+
+import httpx
 
 from tests.chromium import chromium, wait_for
+from tests.studio.run_page import text_of
 from tests.studio.served import served
 
-LONGEST = 120.0
-"""Until the page is answered [s]."""
 
-TENSIONS = "(document.querySelector('.studio-live')?.innerText ?? '').includes('limits')"
-"""The tensions are in the page; they are computed when all panels are loaded."""
-
-
-def processor_time(pid: int) -> float:
+def processor_time(pid):
     """Of a process and its threads [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def start_times(folder: Path) -> dict[str, float]:
+def start_times(folder):
     """Of one start: processor time to each stage, and the page's size."""
-    with served(folder) as (address, process):
-        found = {"to_address_s": processor_time(process.pid)}
-        client = build_opener(HTTPCookieProcessor())
-        client.open(address, timeout=LONGEST).close()  # it gives the cookie
-        with client.open(address.partition("?")[0], timeout=LONGEST) as answer:
-            found["page_kb"] = len(answer.read()) / 1e3
-        found["to_page_s"] = processor_time(process.pid)
+    with served(folder) as (address, process), httpx.Client(timeout=120.0) as client:
+        told = {"to_address_s": processor_time(process.pid)}
+        client.get(address)  # it gives the cookie
+        told["page_kb"] = len(client.get(address.partition("?")[0]).content) / 1e3
+        told["to_page_s"] = processor_time(process.pid)
         with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
             page.get(address)
-            wait_for(page, TENSIONS)
-            found["to_tensions_s"] = processor_time(process.pid)
-    return found
+            wait_for(page, f"{text_of('.studio-live')}.includes('limits')")
+            told["to_tensions_s"] = processor_time(process.pid)
+    return told
 
 
-def main() -> None:
+def main():
     """Measures, and prints JSON."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--starts", type=int, default=5)
-    asked = options.parse_args()
+    count = options.parse_args().starts
     with tempfile.TemporaryDirectory() as folder:
-        starts = [start_times(Path(folder)) for _ in range(asked.starts)]
-    told = {}
+        starts = [start_times(folder) for _ in range(count)]
+    told = {"starts": count}
     for name in starts[0]:
         values = [one[name] for one in starts]
         told[name] = {"median": statistics.median(values), "largest": max(values)}
-    print(json.dumps({"starts": asked.starts} | told, indent=2))
+    print(json.dumps(told, indent=2))
 
 
 if __name__ == "__main__":

@@ -109,6 +109,11 @@ def shown(user, name):
         return False
 
 
+def in_scene(bench, path):
+    """Whether the scene has something, once what was drawn before is there."""
+    return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result(60.0)
+
+
 def open_panel(user, name):
     """Shows another panel."""
     (tabs,) = {element.parent_slot.parent for element in user.find(marker=f"tab-{name}").elements}

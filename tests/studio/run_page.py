@@ -2,9 +2,13 @@
 
 import json
 import time
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from cdpr_drake.systems.scenarios.files import scenario_file
-from tests.chromium import wait_for
+from tests.chromium import chromium, wait_for
+from tests.studio.served import served
 
 FRAMES = """(() => {
     const data = (document.querySelector('.cdpr-plots') || {dataset: {}}).dataset;
@@ -27,16 +31,33 @@ def write_scenario(folder, **replaced):
     return path
 
 
-def press(page, words):
-    """Clicks the tab or button with these words, or this name."""
+@contextmanager
+def opened(*arguments, folder=None, size=(1280, 800)):
+    """A browser at the page of a studio that works in a folder, or in a new one."""
+    with (
+        TemporaryDirectory() as new,
+        TemporaryDirectory() as profile,
+        served(folder or new, *arguments) as (address, _),
+        chromium(Path(profile), size) as page,
+    ):
+        page.get(address)
+        yield page
+
+
+def button(words):
+    """JavaScript for the tab or button with these words, or this name."""
     wanted = json.dumps(words)
-    found = (
+    return (
         "[...document.querySelectorAll('button, .q-tab')].find(e => !e.disabled && "
         "((e.querySelector('.q-tab__label, .block') || e).textContent.trim() === "
         f"{wanted} || e.ariaLabel === {wanted}))"
     )
-    wait_for(page, f"{found} !== undefined")
-    page.execute_script(f"{found}.click()")
+
+
+def press(page, words):
+    """Clicks it."""
+    wait_for(page, f"{button(words)} !== undefined")
+    page.execute_script(f"{button(words)}.click()")
 
 
 def text_of(selector):
@@ -50,8 +71,3 @@ def wait_for_start(page, condition):
     while time.monotonic() < end and not page.execute_script(f"return {condition}"):
         time.sleep(0.2)
     wait_for(page, condition)
-
-
-def frames(page):
-    """See `FRAMES`."""
-    return page.execute_script(f"return {FRAMES}")

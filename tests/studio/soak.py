@@ -6,13 +6,10 @@ The server writes a row every ten seconds: its memory, and how much there is of 
 at the end is what the second half of the time added.
 """
 
-from __future__ import annotations
-
 import argparse
 import asyncio
 import csv
 import gc
-import http.client
 import os
 import random
 import statistics
@@ -21,18 +18,16 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
-from tests.chromium import chromium
-from tests.studio.run_page import write_scenario
-from tests.studio.served import served
+import httpx
 
-EVERY = 10.0
-"""Between two rows [s]."""
+from cdpr_drake.studio.panel import PANELS
+from tests.chromium import chromium
+from tests.studio.run_page import button, write_scenario
+from tests.studio.served import served
 
 HOSTS = tuple(f"127.0.0.{k}" for k in range(1, 5))
 """Cookies are kept by host: a session each, in one browser."""
@@ -45,23 +40,11 @@ if (location.pathname.startsWith('/scene/'))
 """
 """Scenes are drawn in software, and nobody looks at them."""
 
-TURN = """
-const tabs = [...document.querySelectorAll('.q-tab')];
-const tab = tabs.find(e => e.innerText.split('\\n').pop().trim() === arguments[0]) ??
-    tabs[Math.floor(Math.random() * tabs.length)];
-tab.click();
-"""
-
 SLIDE = """
 const sliders = [...document.querySelectorAll('.q-slider [tabindex="0"]')];
 for (const kind of ['keydown', 'keyup'])
     sliders[Math.floor(Math.random() * sliders.length)].dispatchEvent(new KeyboardEvent(
         kind, {keyCode: Math.random() < 0.5 ? 37 : 39, bubbles: true}));
-"""
-
-PRESS = """
-[...document.querySelectorAll('.q-tab-panel button')].find(e => e.checkVisibility() &&
-    (e.ariaLabel ?? e.innerText.split('\\n').pop().trim()) === arguments[0]).click();
 """
 
 TYPE = """
@@ -86,7 +69,7 @@ setTimeout(() => {
 # In the server's process.
 
 
-def watched() -> None:
+def watched():
     """Runs `cdpr studio` with the arguments of this process; it writes rows to $SOAK_CSV."""
     from nicegui import app, background_tasks
 
@@ -96,33 +79,30 @@ def watched() -> None:
     main(["studio", *sys.argv[1:]])
 
 
-async def _write_rows() -> None:
-    start, writer = time.monotonic(), None
+async def _write_rows():
+    start = time.monotonic()
     with open(os.environ["SOAK_CSV"], "w", newline="") as file:
+        writer = csv.DictWriter(file, ["time_s", *held()])
+        writer.writeheader()
         while True:
-            row = {"time_s": round(time.monotonic() - start, 1)} | held()
-            writer = writer or csv.DictWriter(file, list(row))
-            if file.tell() == 0:
-                writer.writeheader()
-            writer.writerow(row)
+            writer.writerow({"time_s": round(time.monotonic() - start, 1)} | held())
             file.flush()
-            await asyncio.sleep(EVERY)
+            await asyncio.sleep(10.0)
 
 
-def held() -> dict[str, float]:
+def held():
     """What this process holds."""
     from nicegui import Client, Event
     from nicegui.element import Element
 
     from cdpr_drake.studio.session import Workbench
 
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    kinds: Counter[type] = Counter()
-    objects = gc.get_objects()
+    objects, kinds = gc.get_objects(), Counter()
     for thing in objects:
         for kind in (Workbench, Client, Element):
             if issubclass(type(thing), kind):
                 kinds[kind] += 1
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
         "rss_mb": round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1),
         "tasks": len(asyncio.all_tasks()), "threads": threading.active_count(),
@@ -135,68 +115,63 @@ def held() -> dict[str, float]:
 # In the process that uses it.
 
 
-def request_all(address: str, seconds: float, found: Counter[str]) -> None:
+def request_all(url, seconds, found):
     """Plain requests to all of a server's addresses, with a cookie and without."""
-    parts = urlsplit(address)
-    cookie = ""
-    paths = ["/", "/scene/", "/scene/meshcat.js", "/favicon.ico", "/nothing", f"/?{parts.query}",
+    home, _, query = url.partition("/?")
+    paths = ["/", "/scene/", "/scene/meshcat.js", "/favicon.ico", "/nothing", f"/?{query}",
              "/_nicegui_ws/socket.io/?EIO=4&transport=polling"]  # fmt: skip
+    cookies = {}
     for number, path in zip(range(REQUESTS), cycle(paths), strict=False):
-        connection = http.client.HTTPConnection(HOSTS[0], parts.port, timeout=60.0)
         try:
-            connection.request("GET", path, headers={"Cookie": cookie} if number % 3 else {})
-            answer = connection.getresponse()
-            body = answer.read().decode(errors="replace")
-            found[f"HTTP {answer.status}"] += 1
-            cookie = cookie or (answer.headers["Set-Cookie"] or "").partition(";")[0]
-            if path == "/" and answer.status == 200 and len(paths) < 12:
-                paths += [x.partition('"')[0] for x in body.split('="')[1:] if x[0] == "/"]
-        except OSError as problem:
+            sent = cookies if number % 3 else {}
+            answer = httpx.get(home + path, cookies=sent, timeout=60.0, verify=False)
+            found[f"HTTP {answer.status_code}"] += 1
+            cookies = cookies or dict(answer.cookies)
+            if path == "/" and answer.status_code == 200 and len(paths) < 12:
+                paths += [x.partition('"')[0] for x in answer.text.split('="')[1:] if x[0] == "/"]
+        except httpx.HTTPError as problem:
             found[type(problem).__name__] += 1
-        finally:
-            connection.close()
         time.sleep(seconds / REQUESTS)
 
 
-def use(page: Any, address: str, seconds: float, chance: random.Random) -> Counter[str]:
+def use(page, url, seconds, chance):
     """Uses a studio in many tabs; how often each action succeeded or failed."""
-    parts, found = urlsplit(address), Counter[str]()
-    url = "http://{}:" + f"{parts.port}/?{parts.query}"
 
-    def open_tab(number: int) -> None:
+    def open_tab():
         page.switch_to.new_window("tab")
         page.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": STILL})
-        page.get(url.format(HOSTS[number % len(HOSTS)]))
+        page.get(url.replace(HOSTS[0], chance.choice(HOSTS)))
 
-    def in_panel(panel: str, script: str, *words: str) -> Callable[[], None]:
-        def act() -> None:
-            page.execute_script(TURN, panel)
-            time.sleep(0.4)
-            page.execute_script(script, *words)
-
-        return act
-
-    def replace_tab() -> None:
+    def replace_tab():
         page.close()
         page.switch_to.window(page.window_handles[0])
-        open_tab(chance.randrange(len(HOSTS)))
+        open_tab()
 
-    def field() -> None:
-        in_panel("Robot", TYPE, f"{-0.4 - 0.1 * chance.random():.3f}")()
+    def click(words):
+        page.execute_script(f"{button(words)}.click()")
+
+    def in_panel(panel, script, *words):
+        click(panel)
+        time.sleep(0.4)
+        page.execute_script(script, *words)
+
+    def field():
+        in_panel("Robot", TYPE, f"{-0.4 - 0.1 * chance.random():.3f}")
         time.sleep(0.3)
-        page.execute_script(PRESS, "Undo, Ctrl-Z")
+        click("Undo, Ctrl-Z")
 
-    actions: dict[str, tuple[float, Callable[[], None]]] = {
-        "tab": (4.0, lambda: page.execute_script(TURN, "")),
-        "slider": (5.0, in_panel("Pose", SLIDE)),
+    actions = {
+        "tab": (4.0, lambda: click(chance.choice([panel.title for panel in PANELS.values()]))),
+        "slider": (5.0, lambda: in_panel("Pose", SLIDE)),
         "field and undo": (4.0, field),
-        "scenario": (1.0, in_panel("Run", CHOOSE)),
-        "run": (0.3, in_panel("Run", PRESS, "Start")),
+        "scenario": (1.0, lambda: in_panel("Run", CHOOSE)),
+        "run": (0.3, lambda: in_panel("Run", f"{button('Start')}.click()")),
         "reload": (1.0, page.refresh),
         "another tab": (0.5, replace_tab),
     }
-    for number in range(TABS):
-        open_tab(number)
+    found = Counter()
+    for _ in range(TABS):
+        open_tab()
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         page.switch_to.window(chance.choice(page.window_handles[1:]))
@@ -210,27 +185,26 @@ def use(page: Any, address: str, seconds: float, chance: random.Random) -> Count
     return found
 
 
-def verdict(rows: list[dict[str, float]]) -> str:
+def verdict(rows):
     """What the second half of the time added, from medians of its first and its last sixth."""
     last = rows[len(rows) // 2 :]
     sixth = max(len(last) // 6, 1)
-    lines = []
     for name in rows[0]:
         early, late = (
-            statistics.median(row[name] for row in part) for part in (last[:sixth], last[-sixth:])
+            statistics.median(float(row[name]) for row in part)
+            for part in (last[:sixth], last[-sixth:])
         )
-        lines.append(f"{name:10} {early:12.1f} -> {late:12.1f}  {late - early:+.1f}")
-    return "\n".join(lines)
+        yield f"{name:10} {early:12.1f} -> {late:12.1f}  {late - early:+.1f}"
 
 
-def main() -> None:
+def main():
     """Runs it from the command line."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--minutes", type=float, default=60.0)
     options.add_argument("--csv", type=Path, default=Path("soak.csv"))
     options.add_argument("--seed", type=int, default=0)
     asked = options.parse_args()
-    seconds, found = 60.0 * asked.minutes, Counter[str]()
+    seconds, found = 60.0 * asked.minutes, Counter()
     os.environ["SOAK_CSV"] = str(asked.csv.resolve())
     inside = ("-c", "from tests.studio.soak import watched; watched()")
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as profile:
@@ -239,14 +213,14 @@ def main() -> None:
             served(folder, str(short), "--host=*", program=inside) as (address, process),
             chromium(Path(profile)) as page,
         ):
-            other = threading.Thread(target=request_all, args=(address, seconds, found))
+            url = f"http://{HOSTS[0]}:{urlsplit(address).port}/?{urlsplit(address).query}"
+            other = threading.Thread(target=request_all, args=(url, seconds, found))
             other.start()
-            found += use(page, address, seconds, random.Random(asked.seed))
+            found += use(page, url, seconds, random.Random(asked.seed))
             other.join()
             assert process.poll() is None, "the server has ended"
     with asked.csv.open() as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    print(verdict(rows))
+        print(*verdict(list(csv.DictReader(file))), sep="\n")
     print(dict(sorted(found.items())))
 
 
