@@ -17,11 +17,10 @@ from nicegui import run, ui
 
 from cdpr_drake.analyses.runs.steering import BREAK, PUSH
 from cdpr_drake.studio.jobs import JobState
-from cdpr_drake.studio.numbers import pair_table
+from cdpr_drake.studio.numbers import Pair, pair_table, pairs
 from cdpr_drake.studio.plots import MovingPlots, plot_row
 from cdpr_drake.studio.runs import NO_RUN, FinishedRun, RunBoard, RunEntry, RunJob, Sample, read_run
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.side_by_side import Pair, pairs
 from cdpr_drake.studio.views import leaves, show_results
 
 SCENE_SHARE, RAREST_SCENE = 3.0, 2.0

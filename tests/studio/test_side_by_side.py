@@ -4,7 +4,7 @@ import pytest
 
 from cdpr_drake.analyses.tensions import solve_tensions
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.studio.side_by_side import robots_side_by_side
+from cdpr_drake.studio.numbers import robots_side_by_side
 
 
 def by_name(pairs):
