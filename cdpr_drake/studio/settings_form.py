@@ -24,8 +24,6 @@ from cdpr_drake.studio.panel import message, notify, show_errors
 from cdpr_drake.studio.yaml_edit import flow, value_in, with_item, with_value, without_item
 
 Edit = Callable[[str], str]
-"""Makes another text of a document's."""
-
 Action = Callable[[], Awaitable[object]]
 
 LONGEST_LIST = 40
@@ -100,22 +98,17 @@ class SettingsForm:
         without: Sequence[str] = (), first: Sequence[str] = (), opened: Sequence[str] = (),
         lazy: bool = False,
     ) -> None:  # fmt: skip
-        """Places the form into the current slot.
+        """Places the form into the current slot; marks of its inputs begin with `mark`.
 
-        Args:
-            document: Settings.
-            mark: Beginning of the marks of the inputs.
-            common: Places of fields that stand above all groups.
-            without: Names of fields at the top that are not shown.
-            first: Names of the sections that stand above the others.
-            opened: Names of the groups that are unfolded at the start.
-            lazy: True if groups are filled when they are unfolded.
+        `common` are the places of fields above all groups, `without` names of fields at the top
+        that are not shown, `first` of the sections above the others, and `opened` of groups that
+        are unfolded at the start. `lazy` groups are filled when they are unfolded.
         """
         self._document, self._schema, self._mark = document, type(document.value), mark
         self._common, self._without, self._first = common, without, first
         self._unfolded, self._lazy = set(opened), lazy
         self._cells: list[_Cell] = []
-        self._pending: dict[Place, tuple[Any, str, Any]] = {}  # typed, why not, in whose place
+        self._pending: dict[Place, tuple[_Cell, Any, str, Any]] = {}  # typed, why not, for what
         self._layout, self._path = None, document.path
         self._box = ui.element("div").classes("w-full")
         self.refresh()
@@ -129,11 +122,9 @@ class SettingsForm:
         layout = _layout(self._document.value)
         if layout != self._layout:
             self._layout = layout
-            self._cells.clear()
             self._box.clear()
             with self._box:
                 self._build()
-            return
         self._cells = [cell for cell in self._cells if not cell.element.is_deleted]
         for cell in self._cells:
             self._show(cell)
@@ -142,7 +133,8 @@ class SettingsForm:
         with ui.element("div").classes("studio-form"):
             for place in self._common:
                 if hasattr(self._value(place[:-1]), str(place[-1])):
-                    self._row(place, self._rule(place), " ".join(map(str, place)))
+                    rule = self._rules(place[:-1])[str(place[-1])]
+                    self._row(place, rule, " ".join(map(str, place)))
         rules = settings_of(self._schema)
         for name in dict.fromkeys([*self._first, *rules]):
             if rules[name].section:
@@ -171,9 +163,6 @@ class SettingsForm:
         for key in place:
             schema = schema if isinstance(key, int) else settings_of(schema)[key].section
         return settings_of(schema)
-
-    def _rule(self, place: Place) -> Setting:
-        return self._rules(place[:-1])[str(place[-1])]
 
     def _inner(self, place: Place, rule: Setting) -> None:
         """A section with its own, or a table; of what is not there how to add it."""
@@ -264,7 +253,7 @@ class SettingsForm:
 
     def _show(self, cell: _Cell) -> None:
         shown = self._shown(cell)
-        typed, words, before = self._pending.get(cell.place, (shown, "", shown))
+        _, typed, words, before = self._pending.get(cell.place, (cell, shown, "", shown))
         if shown != before:  # somebody has changed that
             del self._pending[cell.place]
             typed, words = shown, ""
@@ -278,21 +267,18 @@ class SettingsForm:
         typed = cell.element.value
         self._pending.pop(cell.place, None)
         if typed != self._shown(cell):
-            words = await self.change(partial(self._typed, cell.place, typed))
+            words = await self.change(partial(self._typed, cell, typed))
             if words:
-                self._pending[cell.place] = typed, words, self._shown(cell)
+                self._pending[cell.place] = cell, typed, words, self._shown(cell)
         self._show(cell)
 
-    def _typed(self, place: Place, typed: Any, text: str) -> str:
-        """The text with what was typed at a place."""
-        field = place[:-1] if isinstance(place[-1], int) else place
-        rules = self._rules(field[:-1])
-        rule, order = rules[str(field[-1])], list(rules)
-        if field != place:
-            rule = replace(rule, type=float)
-            if value_in(load_yaml(text), field) is None:  # it is not in the file
-                text = with_value(text, field, plain_value(self._value(field)), order)
-        return with_value(text, place, typed_value(rule, typed), order)
+    def _typed(self, cell: _Cell, typed: Any, text: str) -> str:
+        """The text with what was typed in a field."""
+        field = cell.place[:-1] if isinstance(cell.place[-1], int) else cell.place
+        order = list(self._rules(field[:-1]))
+        if field != cell.place and value_in(load_yaml(text), field) is None:  # all is the default
+            text = with_value(text, field, plain_value(self._value(field)), order)
+        return with_value(text, cell.place, typed_value(cell.rule, typed), order)
 
     async def change(self, edit: Edit) -> str:
         """Changes the document together with all that is pending, else alone.
@@ -300,11 +286,16 @@ class SettingsForm:
         Returns:
             Words for why not; empty: it is changed.
         """
+
+        def together(text: str) -> str:
+            for cell, typed, *_ in others.values():
+                text = self._typed(cell, typed, text)
+            return edit(text)
+
         pending, words = dict(self._pending), ""
         for others in [pending, {}] if pending else [{}]:
-            edits = [*(partial(self._typed, at, typed) for at, (typed, *_) in others.items()), edit]
             try:
-                await self._document.edit(partial(reduce, lambda text, one: one(text), edits))
+                await self._document.edit(together)
             except (CdprError, OSError, ValueError) as problem:
                 words = "\n".join(self._document.words(CdprError(message(problem))))
                 continue
