@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from secrets import token_hex
 
 from cdpr_drake.errors import CdprError, OutputFolderError
 
@@ -71,13 +71,14 @@ class WorkingFolder:
         path = self.path(name)
         if path.exists() and not overwrite:
             raise OutputFolderError(f"{self.shown(path)}: is there already; replace it, or rename")
+        part = path.with_name(f".part-{token_hex(8)}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with TemporaryDirectory(dir=path.parent, prefix=".part-") as scratch:
-                part = Path(scratch) / "part"
-                part.write_text(text, encoding="utf-8")
-                part.replace(path)
+            part.write_text(text, encoding="utf-8")
+            part.replace(path)
         except OSError as problem:
+            with suppress(OSError):  # it may not be there
+                part.unlink()
             words = problem.strerror or problem
             raise OutputFolderError(f"{self.shown(path)}: cannot be written: {words}") from problem
         return path

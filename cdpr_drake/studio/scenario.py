@@ -14,7 +14,7 @@ from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.schema.input_files import input_text
-from cdpr_drake.schema.typed_yaml import plain_value, plain_values
+from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.folder import is_within
@@ -47,40 +47,31 @@ class ScenarioDraft:
 
     def __init__(self, name: str, folder: Path) -> None:
         """Reads it; raises CdprError if it is refused, or names files outside of the folder."""
-        self.name, self._folder = name, folder.resolve()
         check_moves_robot(name, "the studio")
         path = scenario_file(name).absolute()
-        self._file = self._checked(load_scenario(name))
-        self.own_robot = self.robot = str(self._file.robot)
+        package = Path(cdpr_drake.__file__).resolve().parent
+        shipped = [package, *(package.parent / of_it for of_it in ("models", "systems"))]
+        self.name, self._folders = name, (folder.resolve(), *shipped)
+        self.own_robot = self.robot = ""
         text = input_text(path)
-        self._texts = set(_texts(load_yaml(text)))
+        self._own = dict(_texts(load_yaml(text)))
         self.document: Document[Any] = Document(text, path, self._read)
+        self._file = self.document.value
+        self.own_robot = self.robot = str(self._file.robot)
 
     def _read(self, text: str, path: Path) -> Any:
         """The scenario of a text with the robot that is run; files elsewhere are not read."""
         with suppress(YamlTextError):  # the parser says what is wrong
-            for key, words in set(_texts(load_yaml(text))) - self._texts:
-                places = (self._folder / words, path.parent / words)
-                if key in ("kind", "robot"):
+            for key, words in _texts(load_yaml(text)):
+                places = (self._folders[0] / words, path.parent / words)
+                if key in ("kind", "robot") and words != self._own.get(key, words):
                     accepted = "that of the file; the robot that is open is run"
-                elif "/" in words and not any(is_within(at, self._folder) for at in places):
+                elif not all(is_within(place, *self._folders) for place in places):
                     accepted = "a file in the working folder"
                 else:
                     continue
                 raise ScenarioError(f"{path}: {key}: found {words[:80]}; accepted: {accepted}")
-        return self._checked(parse_scenario(text, path, self._robot_setting()))
-
-    def _checked(self, scenario: Any) -> Any:
-        """Refuses scenarios that name files outside of the working folder and of the package."""
-        package = Path(cdpr_drake.__file__).resolve().parent
-        shipped = [package, *(package.parent / name for name in ("models", "systems"))]
-        for key, words in _texts(plain_values(scenario)):
-            if Path(words).is_absolute() and not is_within(Path(words), self._folder, *shipped):
-                raise ScenarioError(
-                    f"{scenario.name}: {key}: found {words[:80]}; accepted: a file in the working "
-                    "folder"
-                )
-        return scenario
+        return parse_scenario(text, path, self._robot_setting())
 
     def _robot_setting(self) -> tuple[str, ...]:
         return () if self.robot == self.own_robot else (f"robot={flow(self.robot)}",)
@@ -105,7 +96,7 @@ class ScenarioDraft:
 
     def check(self) -> Any:
         """The scenario as it would be run; raises CdprError if it is not accepted."""
-        scenario = self._checked(load_scenario(self.name, self.settings()))
+        scenario = load_scenario(self.name, self.settings())
         check_steered(scenario)
         return scenario
 

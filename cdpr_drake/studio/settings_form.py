@@ -166,10 +166,10 @@ class SettingsForm:
 
     def _inner(self, place: Place, rule: Setting) -> None:
         """A section with its own, or a table; of what is not there how to add it."""
-        value, name, put = self._value(place), _words(rule.name), with_value
+        value, name = self._value(place), _words(rule.name)
         if rule.kind == "sections":
             self._table(place, len(value))
-            name, put = name.removesuffix("s"), with_item
+            name = name.removesuffix("s")
         elif value is None:
             ui.label(rule.doc if place[1:] else "").classes("studio-soft")  # a group has said it
         else:
@@ -178,7 +178,7 @@ class SettingsForm:
                 edit = partial(with_value, place=place, value=None)
                 tool(f"Remove {name}", "delete", partial(self._change, edit))
             return
-        tool(f"Add {name}", "add", partial(self._add, place, f"Add {name}", put))
+        tool(f"Add {name}", "add", partial(self._add, place, f"Add {name}"))
 
     def _section(self, place: Place) -> None:
         """The fields of a section, or of an item of a list, then its own sections."""
@@ -353,7 +353,7 @@ class SettingsForm:
             del self._pending[at]  # numbers mean other items then
         await self._change(partial(without_item, place=place))
 
-    def _add(self, place: Place, title: str, put: Callable[[str, Place, Any], str]) -> None:
+    def _add(self, place: Place, title: str) -> None:
         """A dialog for what a new section or item must have."""
 
         async def add() -> None:
@@ -361,6 +361,7 @@ class SettingsForm:
             for (*above, name), (rule, field) in fields.items():
                 inner = reduce(lambda section, key: section.setdefault(key, {}), above, value)
                 inner[name] = typed_value(rule, field.value)
+            put = with_value if self._value(place) is None else with_item
             if words := await self.change(lambda text: put(text, place, value)):
                 raise CdprError(words)
 
