@@ -43,6 +43,19 @@ async def test_a_field_changes_the_robot_and_its_tensions_and_is_undone(user, be
     assert after("z") == -0.37
 
 
+async def test_edits_that_need_each_other_are_taken_together(user, bench):
+    robot, lower = bench.robot, field(user, "cell-tension_bounds-lower")
+    type_into(user, "cell-tension_bounds-lower", "70")
+    await until(lambda: "accepted: lower < upper" in str(problems(user)))
+    type_into(user, "cell-platform-mass", "1.5")
+    await until(lambda: robot.value.platform.mass == 1.5)
+    assert robot.value.tension_bounds.lower < 70
+    assert lower.value == "70"
+    type_into(user, "cell-tension_bounds-upper", "80")
+    await until(lambda: robot.value.tension_bounds.lower == 70)
+    assert "error" not in lower.props
+
+
 @pytest.mark.parametrize(
     ("name", "words", "said"),
     [
@@ -61,19 +74,6 @@ async def test_a_wrong_value_is_said_beside_its_field(user, bench, name, words, 
     await until(lambda: any(said in problem for problem in problems(user)))
     assert bench.robot.text == text
     assert "error" in field(user, f"cell-{name}").props
-
-
-async def test_edits_that_need_each_other_are_taken_together(user, bench):
-    robot, lower = bench.robot, field(user, "cell-tension_bounds-lower")
-    type_into(user, "cell-tension_bounds-lower", "70")
-    await until(lambda: "accepted: lower < upper" in str(problems(user)))
-    type_into(user, "cell-platform-mass", "1.5")
-    await until(lambda: robot.value.platform.mass == 1.5)
-    assert robot.value.tension_bounds.lower < 70
-    assert lower.value == "70"
-    type_into(user, "cell-tension_bounds-upper", "80")
-    await until(lambda: robot.value.tension_bounds.lower == 70)
-    assert "error" not in lower.props
 
 
 async def test_a_click_before_the_browser_says_that_it_is_dark_makes_the_page_light(user, bench):
