@@ -64,7 +64,7 @@ class ScenarioDraft:
         with suppress(YamlTextError):  # the parser says what is wrong
             for key, words in _texts(load_yaml(text)):
                 places = (self._folders[0] / words, path.parent / words)
-                if key in ("kind", "robot") and words != self._own.get(key, words):
+                if key in ("kind", "robot") and words != self._own.get(key):
                     accepted = "that of the file; the robot that is open is run"
                 elif not all(is_within(place, *self._folders) for place in places):
                     accepted = "a file in the working folder"
