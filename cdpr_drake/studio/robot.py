@@ -72,11 +72,6 @@ async def _act(bench: Workbench, action: Callable[[Workbench], Awaitable[None]])
         await action(bench)
 
 
-def _names(bench: Workbench, suffixes: tuple[str, ...]) -> tuple[list[str], list[str]]:
-    """Robots of the package, and files of the folder; read in another thread."""
-    return list(robot_names()), bench.folder.files(suffixes)
-
-
 async def open_dialog(bench: Workbench) -> None:
     """Chooses a robot of the package, a file of the folder, or files of this computer."""
 
@@ -95,10 +90,10 @@ async def open_dialog(bench: Workbench) -> None:
         if not await attempt(partial(take, bench.files.upload, content)):
             upload.reset()
 
-    robots, files = await asyncio.to_thread(_names, bench, UPLOADS)
+    files = await asyncio.to_thread(bench.folder.files, UPLOADS)
     with dialog("Open a robot") as attempt:
         for mark, label, names in (
-            ("open-robot", "Robot of the package", robots),
+            ("open-robot", "Robot of the package", list(robot_names())),
             ("open-file", f"File in {bench.folder.root}", files),
         ):
             chosen = ui.select(names, label=label, with_input=True, on_change=choose)
@@ -117,22 +112,19 @@ async def open_dialog(bench: Workbench) -> None:
 
 
 async def _save(bench: Workbench) -> None:
-    if bench.file:
-        _save_to(bench, bench.file, overwrite=True)
-    else:
+    if not bench.file:
         await save_dialog(bench)
-
-
-def _save_to(bench: Workbench, name: str, overwrite: bool) -> None:
-    bench.save(name, overwrite)
-    notify(f"saved as {name}", "positive")
+        return
+    bench.save(bench.file, overwrite=True)
+    notify(f"saved as {bench.file}", "positive")
 
 
 async def save_dialog(bench: Workbench) -> None:
     """Asks for a name in the folder."""
 
     async def save() -> None:
-        _save_to(bench, str(name.value or ""), replace.value)
+        bench.save(str(name.value or ""), replace.value)
+        notify(f"saved as {name.value}", "positive")
 
     with dialog(f"Save in {bench.folder.root}", "Save", save) as attempt:
         name = ui.input("Name", value=bench.file or f"{bench.robot.value.name}.yaml")
@@ -149,11 +141,11 @@ async def export_dialog(bench: Workbench) -> None:
         files, lost = {f"{robot.name}.yaml": bench.robot.text}, None
         if chosen != YAML:
             files, lost = export_robot(robot, chosen), export_omissions(robot, chosen)
-        name, text = next(iter(files.items()))
-        content = text.encode()
-        if len(files) > 1:
-            name, content = f"{name.rpartition('_')[0] or 'robot'}.zip", _zipped(files)
-        ui.download.content(content, name)
+        name, content = next(iter(files.items()))
+        if len(files) == 1:
+            ui.download.content(content, name)
+        else:
+            ui.download.content(_zipped(files), f"{name.rpartition('_')[0] or 'robot'}.zip")
         if lost:
             notify("\n".join(omission_words(lost)), "warning", stays=True)
 
@@ -180,8 +172,8 @@ def place_beside(bench: Workbench) -> None:
         table = ui.html("", sanitize=False).classes("w-full").mark("robot-pairs")
 
     async def unfold() -> None:
-        robots, files = await asyncio.to_thread(_names, bench, (".yaml", ".yml"))
-        other.set_options([NOTHING, *robots, *files], value=other.value)
+        files = await asyncio.to_thread(bench.folder.files, (".yaml", ".yml"))
+        other.set_options([NOTHING, *robot_names(), *files], value=other.value)
 
     async def compare() -> None:
         name, one = str(other.value), bench.robot.value
