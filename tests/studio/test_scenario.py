@@ -48,7 +48,7 @@ def test_changes_are_settings_and_the_old_value_is_none(draft):
         ("robot", "/etc/passwd", "accepted: that of the file"),
         ("kind", "tension_control", "kind: found tension_control; accepted: that of the file"),
         ("perturbations.believed_robot", "/etc/hostname.yaml", "a file in the working folder"),
-        ("perturbations.believed_robot", "../../etc/robot.yaml", "a file in the working folder"),
+        ("perturbations.believed_robot", "../robot.yaml", "a file in the working folder"),
     ],
 )
 def test_what_is_wrong_is_said_and_changes_nothing(draft, tmp_path, key, value, words):
