@@ -27,27 +27,14 @@ class Document(Generic[T]):
     """
 
     def __init__(self, text: str, path: Path, read: Callable[[str, Path], T]) -> None:
-        """With a text that is accepted.
-
-        Args:
-            text: The text.
-            path: The file that messages name.
-            read: Text and path to what the text means; raises a CdprError.
-
-        Raises:
-            CdprError: The text is not accepted.
-        """
+        """With a text that is accepted, and what reads a text of a path, or raises a CdprError."""
         self._read, self.changed = read, Event[[]]()
         self.text, self.value, self.path = text, read(text, path), path
         self._states, self._now = [(text, self.value, path)], 0
         self._editing = asyncio.Lock()
 
     def change(self, text: str, path: Path | None = None) -> None:
-        """Takes another text, as one step that can be undone.
-
-        Args:
-            text: The text.
-            path: Its file from now on; None: as before.
+        """Takes another text, as one step that can be undone; with a path, it is of that file.
 
         Raises:
             CdprError: The text is not accepted; nothing has changed.
@@ -63,14 +50,13 @@ class Document(Generic[T]):
             CdprError: The text is not accepted; nothing has changed.
         """
         async with self._editing:
-            while True:
-                before, path = self.text, self.path
-                text = edit(before)
-                if text == before:
+            before = None
+            while before != (self.text, self.path):  # else it was changed meanwhile
+                before = self.text, self.path
+                text, path = edit(self.text), self.path
+                if text == self.text:
                     return
                 value = await asyncio.to_thread(self._read, text, path)
-                if (self.text, self.path) == (before, path):  # else it was changed meanwhile
-                    break
             self._take(text, value, path)
 
     async def settled(self) -> None:
@@ -121,12 +107,7 @@ class Document(Generic[T]):
         self._go(self._now + 1)
 
     def words(self, problem: Exception, *, lines: bool = False) -> list[str]:
-        """What is wrong with a text that was not accepted, without the name of the file.
-
-        Args:
-            problem: What `change` raised.
-            lines: Whether the numbers of lines stay.
-        """
+        """What is wrong with a refused text without the name of the file, perhaps with lines."""
         file = rf"^{re.escape(str(self.path))}(?::(\d+))?: "
         return [
             re.sub(file, lambda at: f"line {at[1]}: " if lines and at[1] else "", line)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
-from itertools import chain, islice
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
-from tempfile import NamedTemporaryFile
+from secrets import token_hex
 
 from cdpr_drake.errors import CdprError, OutputFolderError
 
@@ -13,15 +13,18 @@ MOST_FILES = 500
 """Files that are listed at most."""
 
 
+def is_within(path: Path, *folders: Path) -> bool:
+    """Whether a path leads, also by links, into one of some folders, which are resolved."""
+    with suppress(OSError, RuntimeError, ValueError):
+        return any(path.resolve().is_relative_to(folder) for folder in folders)
+    return False
+
+
 class WorkingFolder:
     """A folder whose files may be read and written."""
 
     def __init__(self, root: Path) -> None:
-        """Of a folder that exists.
-
-        Raises:
-            CdprError: It is no folder.
-        """
+        """Of a folder; raises CdprError where it is none."""
         if not root.is_dir():
             raise CdprError(f"{root}: found no folder; accepted: one that exists, to work in")
         self.root = root.resolve()
@@ -51,12 +54,12 @@ class WorkingFolder:
 
     def files(self, suffixes: tuple[str, ...]) -> list[str]:
         """Names of files with these endings, here and one folder below, sorted."""
-        paths = chain.from_iterable(sorted(self.root.glob(at)) for at in ("*", "*/*"))
+        paths = [path for at in ("*", "*/*") for path in sorted(self.root.glob(at))]
         names = (
             self.shown(path) for path in paths
             if path.suffix.lower() in suffixes and path.is_file()
         )  # fmt: skip
-        return list(islice((name for name in names if f"/{name}".find("/.") < 0), MOST_FILES))
+        return list(islice((name for name in names if "/." not in f"/{name}"), MOST_FILES))
 
     def write(self, name: str, text: str, overwrite: bool) -> Path:
         """Writes a file at once, or not at all.
@@ -68,19 +71,14 @@ class WorkingFolder:
         path = self.path(name)
         if path.exists() and not overwrite:
             raise OutputFolderError(f"{self.shown(path)}: is there already; replace it, or rename")
-        part: Path | None = None
+        part = path.with_name(f".part-{token_hex(8)}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with NamedTemporaryFile(
-                "w", dir=path.parent, prefix=".part-", delete=False, encoding="utf-8"
-            ) as file:
-                part = Path(file.name)
-                file.write(text)
-            os.chmod(part, 0o644)
+            part.write_text(text, encoding="utf-8")
             part.replace(path)
         except OSError as problem:
-            if part is not None:
-                part.unlink(missing_ok=True)
+            with suppress(OSError):  # it may not be there
+                part.unlink()
             words = problem.strerror or problem
             raise OutputFolderError(f"{self.shown(path)}: cannot be written: {words}") from problem
         return path

@@ -10,23 +10,17 @@ from functools import partial
 from html import escape
 from typing import Any
 
-from nicegui import events, run, ui
+from nicegui import events, ui
 
 from cdpr_drake.formats.robot_exchange import export_robot
 from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
-from cdpr_drake.studio.numbers import pair_table
+from cdpr_drake.studio.numbers import Pair, pair_table, robots_side_by_side
 from cdpr_drake.studio.panel import notify, show_errors
-from cdpr_drake.studio.robot_files import (
-    LARGEST_UPLOAD,
-    MOST_UPLOADS,
-    UPLOADS,
-    OpenedRobot,
-)
+from cdpr_drake.studio.robot_files import LARGEST_UPLOAD, MOST_UPLOADS, UPLOADS, OpenedRobot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.settings_form import SettingsForm, dialog, document_buttons, tool
-from cdpr_drake.studio.side_by_side import Pair, robots_side_by_side
 
 FIRST = ("cables", "platform", "tension_bounds")
 OPENED = ("cables", "tension_bounds")
@@ -50,22 +44,21 @@ def robot_panel(bench: Workbench) -> None:
     title = ui.label().classes("studio-title").mark("robot-title")
     where = ui.label().classes("studio-soft").mark("robot-file")
     card = ui.element("section").classes("studio-card").mark("assumed")
-    card.props('aria-label="What was assumed"')
+    with card.props('aria-label="What was assumed"'):
+        ui.label("What this robot's file did not say").classes("studio-subtitle")
+        assumed = ui.html("", sanitize=False)
+        tool("Seen", "check", bench.forget_assumed).mark("assumed-seen")
 
     def refresh() -> None:
         robot = bench.robot.value
         title.text = f"{robot.name}: {robot.title}" if robot.title else robot.name
         where.text = f"{bench.file}: {bench.state}" if bench.file else NO_FILE
-        card.clear()
         card.set_visibility(bool(bench.assumed))
-        with card:
-            ui.label("What this robot's file did not say").classes("studio-subtitle")
-            items = "".join(f"<li>{escape(line)}</li>" for line in bench.assumed)
-            ui.html(f"<ul>{items}</ul>", sanitize=False)
-            tool("Seen", "check", bench.forget_assumed).mark("assumed-seen")
+        items = "".join(f"<li>{escape(line)}</li>" for line in bench.assumed)
+        assumed.content = f"<ul>{items}</ul>"
 
     live_workspace_bar(bench)
-    SettingsForm(bench.robot, first=FIRST, opened=OPENED, colored=("cables",))
+    SettingsForm(bench.robot, first=FIRST, opened=OPENED)
     place_beside(bench)
     add_point_dragging(bench)
     refresh()
@@ -79,36 +72,28 @@ async def _act(bench: Workbench, action: Callable[[Workbench], Awaitable[None]])
         await action(bench)
 
 
-def _names(bench: Workbench, suffixes: tuple[str, ...]) -> tuple[list[str], list[str]]:
-    """Robots of the package, and files of the folder; read in another thread."""
-    return list(robot_names()), bench.folder.files(suffixes)
-
-
 async def open_dialog(bench: Workbench) -> None:
     """Chooses a robot of the package, a file of the folder, or files of this computer."""
 
-    async def take(read: Callable[[], OpenedRobot], take: Callable[[OpenedRobot], Any]) -> None:
-        opened = await run.io_bound(read)
-        if opened is not None:  # the server is not ending
-            take(opened)
-            if opened.notes:
-                notify(opened.notes[0], "info")
+    async def take(read: Callable[..., OpenedRobot], what: Any) -> None:
+        opened = await asyncio.to_thread(read, what)
+        bench.take_opened(opened)
+        if opened.notes:
+            notify(opened.notes[0], "info")
 
     async def choose(event: Any) -> None:
         if event.value:
-            read = partial(bench.files.open, str(event.value))
-            await attempt(partial(take, read, bench.take_opened))
+            await attempt(partial(take, bench.files.open, str(event.value)))
 
     async def receive(event: events.MultiUploadEventArguments) -> None:
         content = {file.name: await file.read() for file in event.files}
-        read = partial(bench.files.upload, content)
-        if not await attempt(partial(take, read, bench.take_opened)):
+        if not await attempt(partial(take, bench.files.upload, content)):
             upload.reset()
 
-    robots, files = await asyncio.to_thread(_names, bench, UPLOADS)
+    files = await asyncio.to_thread(bench.folder.files, UPLOADS)
     with dialog("Open a robot") as attempt:
         for mark, label, names in (
-            ("open-robot", "Robot of the package", robots),
+            ("open-robot", "Robot of the package", list(robot_names())),
             ("open-file", f"File in {bench.folder.root}", files),
         ):
             chosen = ui.select(names, label=label, with_input=True, on_change=choose)
@@ -127,23 +112,19 @@ async def open_dialog(bench: Workbench) -> None:
 
 
 async def _save(bench: Workbench) -> None:
-    if bench.file:
-        save_to(bench, bench.file, overwrite=True)
-    else:
+    if not bench.file:
         await save_dialog(bench)
-
-
-def save_to(bench: Workbench, name: str, overwrite: bool) -> None:
-    """Saves the robot, and says so."""
-    bench.save(name, overwrite)
-    notify(f"saved as {name}", "positive")
+        return
+    bench.save(bench.file, overwrite=True)
+    notify(f"saved as {bench.file}", "positive")
 
 
 async def save_dialog(bench: Workbench) -> None:
     """Asks for a name in the folder."""
 
     async def save() -> None:
-        save_to(bench, str(name.value or ""), replace.value)
+        bench.save(str(name.value or ""), replace.value)
+        notify(f"saved as {name.value}", "positive")
 
     with dialog(f"Save in {bench.folder.root}", "Save", save) as attempt:
         name = ui.input("Name", value=bench.file or f"{bench.robot.value.name}.yaml")
@@ -160,11 +141,11 @@ async def export_dialog(bench: Workbench) -> None:
         files, lost = {f"{robot.name}.yaml": bench.robot.text}, None
         if chosen != YAML:
             files, lost = export_robot(robot, chosen), export_omissions(robot, chosen)
-        name, text = next(iter(files.items()))
-        content = text.encode()
-        if len(files) > 1:
-            name, content = f"{name.rpartition('_')[0] or 'robot'}.zip", _zipped(files)
-        ui.download.content(content, name)
+        name, content = next(iter(files.items()))
+        if len(files) == 1:
+            ui.download.content(content, name)
+        else:
+            ui.download.content(_zipped(files), f"{name.rpartition('_')[0] or 'robot'}.zip")
         if lost:
             notify("\n".join(omission_words(lost)), "warning", stays=True)
 
@@ -191,26 +172,23 @@ def place_beside(bench: Workbench) -> None:
         table = ui.html("", sanitize=False).classes("w-full").mark("robot-pairs")
 
     async def unfold() -> None:
-        robots, files = await asyncio.to_thread(_names, bench, (".yaml", ".yml"))
-        other.set_options([NOTHING, *robots, *files], value=other.value)
+        files = await asyncio.to_thread(bench.folder.files, (".yaml", ".yml"))
+        other.set_options([NOTHING, *robot_names(), *files], value=other.value)
 
-    def compare() -> None:
+    async def compare() -> None:
         name, one = str(other.value), bench.robot.value
-        if name == NOTHING:
-            table.content = ""
-            return
-
-        def show(future: asyncio.Future[list[Pair]]) -> None:
-            with table, show_errors():
-                pairs = future.result()
-                if name == str(other.value) and one is bench.robot.value:
-                    table.content = pair_table(pairs, f"{one.name}, open", name)
 
         def work() -> list[Pair]:
             opened = bench.files.open(name)
             return robots_side_by_side(one, bench.files.read(opened.text, opened.path))
 
-        bench.calculate(work, show)
+        content = ""
+        with show_errors():
+            if name != NOTHING:
+                pairs = await asyncio.wrap_future(bench.calculator.submit(work))
+                content = pair_table(pairs, f"{one.name}, open", name)
+            if name == other.value and one is bench.robot.value:
+                table.content = content
 
     fold.on_value_change(unfold).mark("robot-beside")
     other.on_value_change(compare)

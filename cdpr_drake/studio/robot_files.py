@@ -8,6 +8,7 @@ or where the robot itself is.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
@@ -20,7 +21,7 @@ from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import parse_robot, robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml, too_many_bytes
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.folder import WorkingFolder, is_within
 from cdpr_drake.studio.yaml_edit import value_in
 
 LARGEST_UPLOAD = 4_194_304
@@ -54,14 +55,13 @@ class OpenedRobot:
 
 
 class RobotFiles:
-    """Reads and writes robots for a workbench."""
+    """Reads robots for a workbench."""
 
     def __init__(self, folder: WorkingFolder, also: Path | None = None) -> None:
         """Of a working folder, and of one more folder that the user has named at the start."""
         self._folder = folder
-        self._roots = [folder.root, robot_file(robot_names()[0]).parent.parent.resolve()]
-        if also is not None:
-            self._roots.append(also.resolve())
+        shipped = robot_file(robot_names()[0]).parent.parent
+        self._roots = [root.resolve() for root in (folder.root, shipped, also) if root is not None]
 
     def read(self, text: str, path: Path) -> Robot:
         """A robot from the text of a robot file.
@@ -70,15 +70,10 @@ class RobotFiles:
             RobotFileError: The text is too long, does not describe a possible robot, or names a
                 file that lies elsewhere.
         """
-        try:
+        mesh = None
+        with suppress(YamlTextError):  # the reader of robots says what is wrong
             mesh = value_in(load_yaml(text), ("platform", "shape", "file"))
-        except YamlTextError:
-            mesh = None  # the reader of robots says what is wrong
-        try:
-            where = (path.parent / mesh).resolve() if isinstance(mesh, str) else self._roots[0]
-        except (OSError, ValueError, RuntimeError):
-            where = Path("/")
-        if not any(where.is_relative_to(root) for root in self._roots):
+        if isinstance(mesh, str) and not is_within(path.parent / mesh, *self._roots):
             raise RobotFileError(
                 f"{path}: platform.shape.file: found {mesh[:80]!r}, outside of the working "
                 "folder; accepted: a file in it"
@@ -100,7 +95,8 @@ class RobotFiles:
 
     def _read_file(self, path: Path, folder: Path) -> OpenedRobot:
         """The robot of a file, which stands in a folder from now on."""
-        source, notes = path, list[str]()
+        notes: list[str] = []
+        where = folder / path.name
         if path.suffix.lower() not in UPLOADS:
             raise RobotFileError(
                 f"{path.name[:100]}: found the ending {path.suffix[:20]!r}; accepted: "
@@ -113,18 +109,17 @@ class RobotFiles:
             notes = [f"read as {imported.tool}"]
             notes += [f"assumed {key}: {words}" for key, words in completed.assumed.items()]
             notes += [words.replace(f"{path.parent}/", "") for words in completed.remarks]
-            path = path.with_suffix(".yaml")
+            where = where.with_suffix(".yaml")
         else:
-            large = too_many_bytes(path)
-            if large:
+            if large := too_many_bytes(path):
                 raise RobotFileError(f"{path.name}: {large}")
             try:
                 text = path.read_text(encoding="utf-8")
             except UnicodeDecodeError as problem:
                 raise RobotFileError(f"{path.name}: cannot be read: {problem}") from problem
-        path = folder / path.name
-        self.read(text, path)
-        return OpenedRobot(text, path, notes, self._folder.shown(path) if path == source else "")
+        self.read(text, where)
+        is_own = where == path and not notes
+        return OpenedRobot(text, where, notes, self._folder.shown(path) if is_own else "")
 
     def upload(self, files: Mapping[str, bytes]) -> OpenedRobot:
         """A robot from files that came over the network, by their names; one, or those of a model.
@@ -134,10 +129,9 @@ class RobotFiles:
         """
         if not 0 < len(files) <= MOST_UPLOADS:
             raise RobotFileError(f"found {len(files)} files; accepted: 1 to {MOST_UPLOADS}")
+        problems: list[str] = []
         with TemporaryDirectory(prefix="cdpr-studio-") as scratch:
-            paths = [_put(Path(scratch), *item) for item in files.items()]
-            problems: list[str] = []
-            for path in paths:
+            for path in [_put(Path(scratch), *item) for item in files.items()]:
                 try:
                     return self._read_file(path, self._folder.root)
                 except CdprError as problem:

@@ -17,14 +17,13 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import Entry
 from cdpr_drake.studio.jobs import Job, JobState
-from cdpr_drake.studio.numbers import pair_table
+from cdpr_drake.studio.numbers import Pair, pair_table, pairs
 from cdpr_drake.studio.panel import COMPARED, RUN, robot_argument, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import NO_RUN, SPEEDS, FinishedRun, RunBoard, RunJob, Sample
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.side_by_side import Pair, pairs
 from cdpr_drake.studio.views import leaves, send_file, show_results
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO

@@ -14,9 +14,10 @@ from cdpr_drake.analyses.runs.steering import UNTOUCHED, check_steered
 from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.schema.input_files import input_text
-from cdpr_drake.schema.typed_yaml import plain_value, plain_values
+from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
 from cdpr_drake.studio.document import Document
+from cdpr_drake.studio.folder import is_within
 from cdpr_drake.studio.panel import message
 from cdpr_drake.studio.settings_form import SettingsForm, document_buttons
 from cdpr_drake.studio.yaml_edit import flow
@@ -45,58 +46,40 @@ class ScenarioDraft:
     """
 
     def __init__(self, name: str, folder: Path) -> None:
-        """Reads it.
-
-        Args:
-            name: As the attribute.
-            folder: Working folder.
-
-        Raises:
-            CdprError: It is not accepted, or names files outside of the folder.
-        """
-        self.name, self._folder = name, folder.resolve()
+        """Reads it; raises CdprError if it is refused, or names files outside of the folder."""
         check_moves_robot(name, "the studio")
         path = scenario_file(name).absolute()
-        self._file = self._checked(load_scenario(name))
-        self.own_robot = self.robot = str(self._file.robot)
+        package = Path(cdpr_drake.__file__).resolve().parent
+        shipped = [package, *(package.parent / of_it for of_it in ("models", "systems"))]
+        self.name, self._folders = name, (folder.resolve(), *shipped)
+        self.own_robot = self.robot = ""
         text = input_text(path)
-        self._texts = set(texts(load_yaml(text)))
+        self._own = dict(_texts(load_yaml(text)))
         self.document: Document[Any] = Document(text, path, self._read)
+        self._file = self.document.value
+        self.own_robot = self.robot = str(self._file.robot)
 
     def _read(self, text: str, path: Path) -> Any:
         """The scenario of a text with the robot that is run; files elsewhere are not read."""
         with suppress(YamlTextError):  # the parser says what is wrong
-            for key, words in set(texts(load_yaml(text))) - self._texts:
-                bases = (self._folder, path.parent)
-                if key in ("kind", "robot"):
+            for key, words in _texts(load_yaml(text)):
+                places = (self._folders[0] / words, path.parent / words)
+                if key in ("kind", "robot") and words != self._own.get(key):
                     accepted = "that of the file; the robot that is open is run"
-                elif "/" in words and not any(_is_in(base / words, self._folder) for base in bases):
+                elif not all(is_within(place, *self._folders) for place in places):
                     accepted = "a file in the working folder"
                 else:
                     continue
                 raise ScenarioError(f"{path}: {key}: found {words[:80]}; accepted: {accepted}")
-        overrides = () if self.robot == self.own_robot else (f"robot={flow(self.robot)}",)
-        return self._checked(parse_scenario(text, path, overrides))
+        return parse_scenario(text, path, self._robot_setting())
 
-    def _checked(self, scenario: Any) -> Any:
-        """Refuses scenarios that name files outside of the working folder and of the package."""
-        package = Path(cdpr_drake.__file__).resolve().parent
-        shipped = [package, *(package.parent / name for name in ("models", "systems"))]
-        for key, words in texts(plain_values(scenario)):
-            if Path(words).is_absolute() and not _is_in(Path(words), self._folder, *shipped):
-                raise ScenarioError(
-                    f"{scenario.name}: {key}: found {words[:80]}; accepted: a file in the working "
-                    "folder"
-                )
-        return scenario
+    def _robot_setting(self) -> tuple[str, ...]:
+        return () if self.robot == self.own_robot else (f"robot={flow(self.robot)}",)
 
     def settings(self) -> tuple[str, ...]:
         """What --set is given."""
-        items = differences(self._file, self.document.value)
-        made = [item for item in items if not item.startswith("robot=")]
-        if self.robot != self.own_robot:
-            made.append(f"robot={flow(self.robot)}")
-        return tuple(made)
+        made = _differences(self._file, self.document.value)
+        return (*(item for item in made if not item.startswith("robot=")), *self._robot_setting())
 
     def by_hand(self) -> tuple[str, ...]:
         """What --set is given besides, so that cables can be broken and the platform pushed.
@@ -112,41 +95,30 @@ class ScenarioDraft:
         return tuple(made)
 
     def check(self) -> Any:
-        """The scenario as it would be run.
-
-        Raises:
-            CdprError: It is not accepted.
-        """
-        scenario = self._checked(load_scenario(self.name, self.settings()))
+        """The scenario as it would be run; raises CdprError if it is not accepted."""
+        scenario = load_scenario(self.name, self.settings())
         check_steered(scenario)
         return scenario
 
 
-def differences(before: Any, now: Any, above: str = "") -> Iterator[str]:
+def _differences(before: Any, now: Any, above: str = "") -> Iterator[str]:
     """Items key=value by which settings differ, as --set takes them: lists whole, null for none."""
     for name, rule in settings_of(type(before)).items():
         old, new, key = getattr(before, name), getattr(now, name), f"{above}{name}"
         if rule.kind == "section" and old is not None and new is not None:
-            yield from differences(old, new, f"{key}.")
+            yield from _differences(old, new, f"{key}.")
         elif plain_value(old) != plain_value(new):
             yield f"{key}={flow(plain_value(new))}"
 
 
-def texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:
+def _texts(value: Any, key: str = "") -> Iterator[tuple[str, str]]:
     """Words in plain values, with their keys."""
     if isinstance(value, str):
         yield key, value
-    inside = value if isinstance(value, dict) else {}
-    if isinstance(value, list):
-        inside = dict(enumerate(value))
-    for name, inner in inside.items():
-        yield from texts(inner, f"{key}.{name}".removeprefix("."))
-
-
-def _is_in(path: Path, *folders: Path) -> bool:
-    with suppress(OSError, RuntimeError, ValueError):
-        return any(path.resolve().is_relative_to(folder) for folder in folders)
-    return False
+    inside = dict(enumerate(value)) if isinstance(value, list) else value
+    if isinstance(inside, dict):
+        for name, inner in inside.items():
+            yield from _texts(inner, f"{key}.{name}".removeprefix("."))
 
 
 class ScenarioForm:

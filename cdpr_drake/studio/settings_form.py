@@ -17,35 +17,29 @@ from nicegui import ui
 from cdpr_drake.errors import CdprError, DataFileError
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.declarations import Setting, settings_of
-from cdpr_drake.schema.typed_yaml import plain_value
+from cdpr_drake.schema.typed_yaml import Place, plain_value
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.panel import message, notify, show_errors
-from cdpr_drake.studio.yaml_edit import Place, flow, value_in, with_item, with_value, without_item
+from cdpr_drake.studio.yaml_edit import flow, value_in, with_item, with_value, without_item
 
 Edit = Callable[[str], str]
-"""Makes another text of a document's."""
-
-SHORT = 3
-"""Arrays of so many numbers that have to be there get a field for each number."""
+Action = Callable[[], Awaitable[object]]
 
 LONGEST_LIST = 40
 """Choices that are offered as a list; more are typed."""
-
-NUMBERS = ("number", "whole")
 
 
 def field_words(rule: Setting, value: Any) -> Any:
     """A value of settings as it stands in a field: words, or True and False of a switch."""
     if rule.kind == "switch":
         return bool(value)
-    if rule.kind in NUMBERS and value is not None:
-        is_short = value == int(value) and abs(value) < 1e7
-        return str(int(value)) if is_short else repr(float(value))
-    if rule.kind == "array" and np.ndim(value) == 1:
-        return ", ".join(field_words(replace(rule, type=float), number) for number in value)
     if value is None or isinstance(value, str):
         return value or ""
+    if rule.kind in ("number", "whole"):
+        return str(value + 0).removesuffix(".0")  # the sum is no -0
+    if rule.kind == "array" and np.ndim(value) == 1:
+        return ", ".join(field_words(replace(rule, type=float), number) for number in value)
     return ", ".join(value) if rule.kind == "texts" else flow(plain_value(value))
 
 
@@ -62,7 +56,7 @@ def typed_value(rule: Setting, typed: Any) -> Any:
     words = str(typed or "").strip()
     if not words and rule.nullable:
         return None
-    if rule.kind in NUMBERS:
+    if rule.kind in ("number", "whole"):
         return _typed_number(words)
     if rule.kind == "text":
         return words
@@ -102,25 +96,19 @@ class SettingsForm:
     def __init__(
         self, document: Document[Any], *, mark: str = "cell", common: Sequence[Place] = (),
         without: Sequence[str] = (), first: Sequence[str] = (), opened: Sequence[str] = (),
-        colored: Sequence[str] = (), lazy: bool = False,
+        lazy: bool = False,
     ) -> None:  # fmt: skip
-        """Places the form into the current slot.
+        """Places the form into the current slot; marks of its inputs begin with `mark`.
 
-        Args:
-            document: Settings.
-            mark: Beginning of the marks of the inputs.
-            common: Places of fields that stand above all groups.
-            without: Names of fields at the top that are not shown.
-            first: Names of the sections that stand above the others.
-            opened: Names of the groups that are unfolded at the start.
-            colored: Names of the lists whose items have the colours of their numbers.
-            lazy: True if groups are filled when they are unfolded.
+        `common` are the places of fields above all groups, `without` names of fields at the top
+        that are not shown, `first` of the sections above the others, and `opened` of groups that
+        are unfolded at the start. `lazy` groups are filled when they are unfolded.
         """
         self._document, self._schema, self._mark = document, type(document.value), mark
         self._common, self._without, self._first = common, without, first
-        self._unfolded, self._colored, self._lazy = set(opened), colored, lazy
+        self._unfolded, self._lazy = set(opened), lazy
         self._cells: list[_Cell] = []
-        self._pending: dict[Place, tuple[Any, str, Any]] = {}  # typed, why not, in whose place
+        self._pending: dict[Place, tuple[_Cell, Any, str, Any]] = {}  # typed, why not, for what
         self._layout, self._path = None, document.path
         self._box = ui.element("div").classes("w-full")
         self.refresh()
@@ -134,11 +122,9 @@ class SettingsForm:
         layout = _layout(self._document.value)
         if layout != self._layout:
             self._layout = layout
-            self._cells.clear()
             self._box.clear()
             with self._box:
                 self._build()
-            return
         self._cells = [cell for cell in self._cells if not cell.element.is_deleted]
         for cell in self._cells:
             self._show(cell)
@@ -146,12 +132,13 @@ class SettingsForm:
     def _build(self) -> None:
         with ui.element("div").classes("studio-form"):
             for place in self._common:
-                if hasattr(value_in(self._document.value, place[:-1]), str(place[-1])):
-                    self._row(place, " ".join(map(str, place)))
+                if hasattr(self._value(place[:-1]), str(place[-1])):
+                    rule = self._rules(place[:-1])[str(place[-1])]
+                    self._row(place, rule, " ".join(map(str, place)))
         rules = settings_of(self._schema)
         for name in dict.fromkeys([*self._first, *rules]):
             if rules[name].section:
-                self._group(name, rules[name].doc, partial(self._inner, (name,)))
+                self._group(name, rules[name].doc, partial(self._inner, (name,), rules[name]))
         self._group("general", "Fields of no section.", partial(self._fields, ()))
 
     def _group(self, name: str, doc: str, fill: Callable[[], None]) -> None:
@@ -167,21 +154,22 @@ class SettingsForm:
         fold.on_value_change(turn)
         turn()
 
+    def _value(self, place: Place) -> Any:
+        return value_in(self._document.value, place)
+
     def _rules(self, place: Place) -> dict[str, Setting]:
         """The settings of the section or item at a place, or of the items of a list there."""
-        names = [key for key in place if isinstance(key, str)]
-        return settings_of(
-            reduce(lambda schema, key: settings_of(schema)[key].section, names, self._schema)
-        )
+        schema = self._schema
+        for key in place:
+            schema = schema if isinstance(key, int) else settings_of(schema)[key].section
+        return settings_of(schema)
 
-    def _inner(self, place: Place) -> None:
+    def _inner(self, place: Place, rule: Setting) -> None:
         """A section with its own, or a table; of what is not there how to add it."""
-        rule = self._rules(place[:-1])[str(place[-1])]
-        value, name = value_in(self._document.value, place), _words(place[-1])
-        put: Callable[[str, Place, Any], str] = with_value
+        value, name = self._value(place), _words(rule.name)
         if rule.kind == "sections":
             self._table(place, len(value))
-            name, put = name.removesuffix("s"), with_item
+            name = name.removesuffix("s")
         elif value is None:
             ui.label(rule.doc if place[1:] else "").classes("studio-soft")  # a group has said it
         else:
@@ -190,7 +178,7 @@ class SettingsForm:
                 edit = partial(with_value, place=place, value=None)
                 tool(f"Remove {name}", "delete", partial(self._change, edit))
             return
-        tool(f"Add {name}", "add", partial(self._add, place, f"Add {name}", put))
+        tool(f"Add {name}", "add", partial(self._add, place, f"Add {name}"))
 
     def _section(self, place: Place) -> None:
         """The fields of a section, or of an item of a list, then its own sections."""
@@ -199,7 +187,7 @@ class SettingsForm:
             if rule.section:
                 ui.label(_words(name)).classes("studio-subtitle").props["title"] = rule.doc
                 with ui.element("div").classes("studio-inner"):
-                    self._inner((*place, name))
+                    self._inner((*place, name), rule)
 
     def _fields(self, place: Place) -> None:
         """Rows of label, inputs and unit; sections are left out."""
@@ -207,32 +195,33 @@ class SettingsForm:
             for name, rule in self._rules(place).items():
                 above = (*place, name) in self._common or (not place and name in self._without)
                 if not rule.section and not above:
-                    self._row((*place, name), name)
+                    self._row((*place, name), rule, name)
 
-    def _row(self, place: Place, words: str) -> None:
-        rule = self._rules(place[:-1])[str(place[-1])]
-        title = ui.label(_words(words) + _axes_words(rule)).classes("studio-label")
-        title.props["title"] = rule.help()
-        self._field(place, ui.element("div").classes("studio-parts"))
+    def _row(self, place: Place, rule: Setting, words: str) -> None:
+        _title("studio-label", rule, _words(words))
+        self._field(place, rule, ui.element("div").classes("studio-parts"))
 
-    def _field(self, place: Place, box: Any) -> None:
+    def _field(self, place: Place, rule: Setting, box: Any) -> None:
         """Makes the inputs of one field in a box, one or one for each number, and their labels."""
-        rule = self._rules(place[:-1])[str(place[-1])]
-        inputs = [(place, rule)]
-        if _in_parts(rule):
-            inputs = [((*place, k), replace(rule, type=float)) for k in range(SHORT)]
-        for at, part in inputs:
+        parts = [((*place, k), replace(rule, type=float), axis) for k, axis in _axes(rule)]
+        for at, part, name in parts or [(place, rule, rule.name)]:
             with box:
-                element = self._input(at, part)
+                element = self._input(at, part, " ".join(map(_words, (*at[:-1], name))))
             problem = ui.label().classes("studio-field-problem").props('role="alert"')
-            self._cells.append(_Cell(at, part, element, problem))
-            self._show(self._cells[-1])
-            self._listen(self._cells[-1])
+            cell = _Cell(at, part, element, problem)
+            self._cells.append(cell)
+            self._show(cell)
+            commit = partial(self._commit, cell)
+            if rule.kind == "switch" or _is_choice(rule):
+                element.on_value_change(commit)
+                continue
+            element.on("keydown.enter", commit).on("blur", commit)
+            element.on("keydown.escape", partial(self._drop, cell))
+            for keys in ("ctrl.z", "meta.z", "ctrl.y", "meta.y"):
+                element.on(f"keydown.{keys}", partial(self._step, cell), ["key", "shiftKey"])
 
-    def _input(self, place: Place, rule: Setting) -> Any:
+    def _input(self, place: Place, rule: Setting, words: str) -> Any:
         last, is_part = place[-1], isinstance(place[-1], int)
-        name = _axes(rule)[int(last)] if is_part else last
-        words = " ".join(map(_words, (*place[:-1], name)))
         if rule.kind == "switch":
             element: Any = ui.switch()
         elif _is_choice(rule):
@@ -242,22 +231,12 @@ class SettingsForm:
         else:
             element = ui.input().props("dense outlined hide-bottom-space")
             in_table = any(isinstance(key, int) for key in place[-2 - is_part : -1])
-            if _unit(rule) and last not in (0, 1) and not in_table:  # whose head has it
+            if rule.unit not in ("", "-") and last not in (0, 1) and not in_table:
                 element.props["suffix"] = rule.unit
             if rule.nullable and rule.kind != "text":
                 element.props["placeholder"] = "not given"
         element.props(f'aria-label="{words}"').mark("-".join(map(str, (self._mark, *place))))
         return element.classes("studio-cell" if is_part else "studio-field")
-
-    def _listen(self, cell: _Cell) -> None:
-        commit, step = partial(self._commit, cell), partial(self._step, cell)
-        if cell.rule.kind == "switch" or _is_choice(cell.rule):
-            cell.element.on_value_change(commit)
-            return
-        cell.element.on("keydown.enter", commit).on("blur", commit)
-        cell.element.on("keydown.escape", partial(self._drop, cell))
-        for keys in ("ctrl.z", "meta.z", "ctrl.y", "meta.y"):
-            cell.element.on(f"keydown.{keys}", step, ["key", "shiftKey"])
 
     def _drop(self, cell: _Cell) -> None:
         self._pending.pop(cell.place, None)
@@ -270,11 +249,11 @@ class SettingsForm:
             (self._document.redo if again else self._document.undo)()
 
     def _shown(self, cell: _Cell) -> Any:
-        return field_words(cell.rule, value_in(self._document.value, cell.place))
+        return field_words(cell.rule, self._value(cell.place))
 
     def _show(self, cell: _Cell) -> None:
         shown = self._shown(cell)
-        typed, words, before = self._pending.get(cell.place, (shown, "", shown))
+        _, typed, words, before = self._pending.get(cell.place, (cell, shown, "", shown))
         if shown != before:  # somebody has changed that
             del self._pending[cell.place]
             typed, words = shown, ""
@@ -288,22 +267,18 @@ class SettingsForm:
         typed = cell.element.value
         self._pending.pop(cell.place, None)
         if typed != self._shown(cell):
-            words = await self.change(partial(self._typed, cell.place, typed))
+            words = await self.change(partial(self._typed, cell, typed))
             if words:
-                self._pending[cell.place] = typed, words, self._shown(cell)
+                self._pending[cell.place] = cell, typed, words, self._shown(cell)
         self._show(cell)
 
-    def _typed(self, place: Place, typed: Any, text: str) -> str:
-        """The text with what was typed at a place."""
-        field = place[:-1] if isinstance(place[-1], int) else place
-        rules = self._rules(field[:-1])
-        rule, order = rules[str(field[-1])], list(rules)
-        if field != place:
-            rule = replace(rule, type=float)
-            if value_in(load_yaml(text), field) is None:  # it is not in the file
-                array = plain_value(value_in(self._document.value, field))
-                text = with_value(text, field, array, order)
-        return with_value(text, place, typed_value(rule, typed), order)
+    def _typed(self, cell: _Cell, typed: Any, text: str) -> str:
+        """The text with what was typed in a field."""
+        field = cell.place[:-1] if isinstance(cell.place[-1], int) else cell.place
+        order = list(self._rules(field[:-1]))
+        if field != cell.place and value_in(load_yaml(text), field) is None:  # all is the default
+            text = with_value(text, field, plain_value(self._value(field)), order)
+        return with_value(text, cell.place, typed_value(cell.rule, typed), order)
 
     async def change(self, edit: Edit) -> str:
         """Changes the document together with all that is pending, else alone.
@@ -311,11 +286,16 @@ class SettingsForm:
         Returns:
             Words for why not; empty: it is changed.
         """
+
+        def together(text: str) -> str:
+            for cell, typed, *_ in others.values():
+                text = self._typed(cell, typed, text)
+            return edit(text)
+
         pending, words = dict(self._pending), ""
         for others in [pending, {}] if pending else [{}]:
-            edits = [*(partial(self._typed, at, typed) for at, (typed, *_) in others.items()), edit]
             try:
-                await self._document.edit(partial(reduce, lambda text, one: one(text), edits))
+                await self._document.edit(together)
             except (CdprError, OSError, ValueError) as problem:
                 words = "\n".join(self._document.words(CdprError(message(problem))))
                 continue
@@ -331,43 +311,38 @@ class SettingsForm:
         return [".".join(map(str, place)) for place in self._pending]
 
     async def _change(self, edit: Edit) -> None:
-        words = await self.change(edit)
-        if words:
+        if words := await self.change(edit):
             notify(words)
 
     def _table(self, place: Place, length: int) -> None:
         """Items in rows: what each must have in columns, all else behind a button."""
-        rules = self._rules(place).items()
-        columns = {name: rule for name, rule in rules if rule.required and not rule.section}
-        widths = (
-            "minmax(11rem, 3fr)" if _in_parts(rule) else "minmax(3.4rem, 0.8fr)"
-            for rule in columns.values()
-        )
+        rules = self._rules(place).values()
+        columns = [rule for rule in rules if rule.required and not rule.section]
+        widths = ("minmax(11rem, 3fr)" if _axes(rule) else "minmax(3.4rem, 0.8fr)"
+                  for rule in columns)  # fmt: skip
         with ui.element("div").classes("studio-table") as table:
             table.style(f"grid-template-columns: 1.1rem {' '.join(widths)} 5.2rem")
             ui.label()
-            for name, rule in columns.items():
-                unit = f" [{rule.unit}]" if _unit(rule) else ""
-                head = ui.label(_words(name) + _axes_words(rule) + unit).classes("studio-head")
-                head.props["title"] = rule.help()
+            for rule in columns:
+                unit = f" [{rule.unit}]" if rule.unit not in ("", "-") else ""
+                _title("studio-head", rule, _words(rule.name), unit)
             ui.label()
             for number in range(length):
-                self._item((*place, number), list(columns))
+                self._item((*place, number), columns)
 
-    def _item(self, place: Place, columns: Sequence[str]) -> None:
+    def _item(self, place: Place, columns: Sequence[Setting]) -> None:
         *_, name, number = place
         swatch = ui.element("i").classes("studio-swatch")
-        if name in self._colored:
+        if name == "cables":
             swatch.style(f"background: {nth_look(int(number)).color}")
         boxes = [ui.element("div").classes("studio-parts") for _ in columns]
-        what = f"{_words(name).rstrip('s')} {int(number) + 1}"
+        what, copy = f"{_words(name).rstrip('s')} {int(number) + 1}", partial(_with_copy, place)
         with ui.row().classes("studio-tools"):
-            tool(f"More of {what}", "more_horiz", lambda: self._more(place, what), bare=True)
-            copy = partial(_with_copy, place)
-            tool(f"Duplicate {what}", "content_copy", lambda: self._change(copy), bare=True)
-            tool(f"Remove {what}", "delete", lambda: self._remove(place), bare=True)
-        for column, box in zip(columns, boxes, strict=True):
-            self._field((*place, column), box)
+            tool(f"More of {what}", "more_horiz", partial(self._more, place, what), bare=True)
+            tool(f"Duplicate {what}", "content_copy", partial(self._change, copy), bare=True)
+            tool(f"Remove {what}", "delete", partial(self._remove, place), bare=True)
+        for rule, box in zip(columns, boxes, strict=True):
+            self._field((*place, rule.name), rule, box)
 
     def _more(self, place: Place, what: str) -> None:
         with dialog(what.capitalize()):
@@ -378,16 +353,16 @@ class SettingsForm:
             del self._pending[at]  # numbers mean other items then
         await self._change(partial(without_item, place=place))
 
-    def _add(self, place: Place, title: str, put: Callable[[str, Place, Any], str]) -> None:
+    def _add(self, place: Place, title: str) -> None:
         """A dialog for what a new section or item must have."""
 
         async def add() -> None:
             value: dict[str, Any] = {}
-            for at, (rule, field) in fields.items():
-                inner = reduce(lambda above, key: above.setdefault(key, {}), at[:-1], value)
-                inner[at[-1]] = typed_value(rule, field.value)
-            words = await self.change(lambda text: put(text, place, value))
-            if words:
+            for (*above, name), (rule, field) in fields.items():
+                inner = reduce(lambda section, key: section.setdefault(key, {}), above, value)
+                inner[name] = typed_value(rule, field.value)
+            put = with_value if self._value(place) is None else with_item
+            if words := await self.change(lambda text: put(text, place, value)):
                 raise CdprError(words)
 
         with dialog(title, "Add", add):
@@ -405,12 +380,11 @@ class SettingsForm:
 
 def _with_copy(place: Place, text: str) -> str:
     """The text with an item like another one, by a name of its own, at the end of its list."""
-    of, number = place[:-1], place[-1]
-    items = value_in(load_yaml(text), of)
-    item = dict(items[number])
+    items = value_in(load_yaml(text), place[:-1])
+    item = dict(items[place[-1]])
     if "name" in item:
         item["name"] = f"{item['name']}_{len(items) + 1}"
-    return with_item(text, of, item)
+    return with_item(text, place[:-1], item)
 
 
 def _required(rules: dict[str, Setting], above: tuple[str, ...] = ()) -> Iterator[Any]:
@@ -432,22 +406,18 @@ def _layout(value: Any) -> Any:
     return {name: _layout(getattr(value, name)) for name, rule in rules if rule.section}
 
 
-def _in_parts(rule: Setting) -> bool:
-    """True if a field is a row of fields, one for each number."""
-    return rule.kind == "array" and rule.shape == (SHORT,) and not rule.nullable
+def _axes(rule: Setting) -> list[tuple[int, str]]:
+    """Numbers and names of the fields of a row, along axes or of angles; none: it is one field."""
+    if rule.kind != "array" or rule.shape != (3,) or rule.nullable:
+        return []
+    names = ("phi", "theta", "psi") if rule.unit in ("deg", "rad") else ("x", "y", "z")
+    return list(enumerate(names))
 
 
-def _axes(rule: Setting) -> tuple[str, str, str]:
-    """Names of the three numbers of a field: along axes, or of angles."""
-    return ("phi", "theta", "psi") if rule.unit in ("deg", "rad") else ("x", "y", "z")
-
-
-def _axes_words(rule: Setting) -> str:
-    return f" {', '.join(_axes(rule))}" if _in_parts(rule) else ""
-
-
-def _unit(rule: Setting) -> str:
-    return "" if rule.unit == "-" else rule.unit
+def _title(kind: str, rule: Setting, words: str, unit: str = "") -> None:
+    axes = ", ".join(name for _, name in _axes(rule))
+    label = ui.label(f"{words} {axes}".strip() + unit).classes(kind)
+    label.props["title"] = rule.help()
 
 
 def _is_choice(rule: Setting) -> bool:
@@ -460,22 +430,21 @@ def _words(key: str | int) -> str:
 
 @contextmanager
 def dialog(
-    title: str, words: str = "", action: Callable[[], Awaitable[object]] | None = None
-) -> Iterator[Callable[[Callable[[], Awaitable[object]]], Awaitable[bool]]]:
+    title: str, words: str = "", action: Action | None = None
+) -> Iterator[Callable[[Action], Awaitable[bool]]]:
     """A dialog that is gone for good when it is closed, with a button for an action.
 
     It gives a function that does an action and closes the dialog, or says in it why not.
     """
 
-    async def attempt(action: Callable[[], Awaitable[object]]) -> bool:
+    async def attempt(action: Action) -> bool:
         said.text = ""
         with show_errors():
             try:
                 await action()
+                element.close()
             except (CdprError, OSError) as problem:
                 said.text = message(problem)
-            else:
-                element.close()
         return element.value is False
 
     with ui.dialog() as element, ui.card().classes("studio-dialog"):
@@ -499,14 +468,14 @@ def document_buttons(document: Document[Any], title: str, mark: str = "") -> Non
         undo.set_enabled(document.can_undo)
         redo.set_enabled(document.can_redo)
 
-    async def apply(text: Any) -> None:
-        try:
-            await document.edit(lambda _: str(text.value or ""))
-        except CdprError as problem:
-            raise DataFileError(*document.words(problem, lines=True)) from problem
-
     def show() -> None:
-        with dialog(title, "Apply", lambda: apply(text)):
+        async def apply() -> None:
+            try:
+                await document.edit(lambda _: str(text.value or ""))
+            except CdprError as problem:
+                raise DataFileError(*document.words(problem, lines=True)) from problem
+
+        with dialog(title, "Apply", apply):
             text = ui.codemirror(document.text, language="YAML", line_wrapping=True)
             text.classes("w-full").style("height: 60vh").mark("whole-text")
 

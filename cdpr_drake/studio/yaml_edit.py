@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import is_dataclass
 from typing import Any
 
 import yaml
 
+from cdpr_drake.schema.typed_yaml import Place
 from cdpr_drake.schema.yaml_files import YamlTextError, compose_yaml, load_yaml
-
-Place = tuple[str | int, ...]
-"""Keys and numbers of items, from the top."""
 
 
 def with_value(text: str, place: Place, value: Any, order: Sequence[str] = ()) -> str:
@@ -29,39 +28,33 @@ def with_value(text: str, place: Place, value: Any, order: Sequence[str] = ()) -
         value: Numbers, texts, switches, None, and lists and mappings of them.
         order: Keys of the mapping in their usual order, for one that is added.
     """
-    data = load_yaml(text)
-    there = (value_in(data, place[:depth]) is not None for depth in range(1, len(place)))
-    depth = next((depth for depth, is_there in enumerate(there, 1) if not is_there), len(place))
-    for key in reversed(place[depth:]):
-        value = {key: value}
-    place = place[:depth]
+    data, last = load_yaml(text), place[-1]
     parent = value_in(data, place[:-1])
-    if isinstance(parent, list) and place[-1] == len(parent):
+    if parent is None:
+        return with_value(text, place[:-1], {last: value}, order)
+    if isinstance(parent, list) and last == len(parent):
         parent.append(value)
     else:
-        parent[place[-1]] = value
-    return _checked(_put(text, place, value, order), data)
+        parent[last] = value
+    return _checked(_put(text, place, flow(value), order), data)
 
 
 def with_item(text: str, place: Place, value: Any) -> str:
     """The text with one more item at the end of the list at a place, made if it is not there."""
     items = value_in(load_yaml(text), place)
-    if items:
-        return with_value(text, (*place, len(items)), value)
-    return with_value(text, place, [value])
+    return with_value(text, (*place, len(items)) if items else place, value if items else [value])
 
 
 def without_item(text: str, place: Place) -> str:
     """The text without the item of a list at a place."""
-    data = load_yaml(text)
-    *above, number = place
-    del value_in(data, tuple(above))[number]
+    data, above, number = load_yaml(text), place[:-1], place[-1]
+    del value_in(data, above)[number]
     items = _node(compose_yaml(text), above)
     if not isinstance(items, yaml.SequenceNode) or items.flow_style or len(items.value) < 2:
         return _checked(None, data)
     node = items.value[int(number)]
     start = text.rfind("\n", 0, node.start_mark.index)
-    return _checked(f"{text[:start]}{text[_line_end(text, _content_end(node)) :]}", data)
+    return _checked(f"{text[:start]}{text[_line_end(text, node) :]}", data)
 
 
 def value_in(data: Any, place: Place) -> Any:
@@ -77,13 +70,12 @@ def value_in(data: Any, place: Place) -> Any:
 class _Flow(yaml.SafeDumper):
     """PyYAML's, with quotes around words that are no names."""
 
+    def represent_str(self, words: str) -> yaml.ScalarNode:
+        style = None if re.fullmatch("[A-Za-z][A-Za-z0-9_-]*", words) else '"'
+        return self.represent_scalar("tag:yaml.org,2002:str", words, style=style)
 
-def _words(dumper: yaml.SafeDumper, words: str) -> yaml.Node:
-    style = None if re.fullmatch("[A-Za-z][A-Za-z0-9_-]*", words) else '"'
-    return dumper.represent_scalar("tag:yaml.org,2002:str", words, style=style)
 
-
-_Flow.add_representer(str, _words)
+_Flow.add_representer(str, _Flow.represent_str)
 
 
 def flow(value: Any) -> str:
@@ -97,22 +89,21 @@ def flow(value: Any) -> str:
 
 def _checked(new: str | None, meant: Any) -> str:
     """The edited text if it means what is meant, else all of it written anew."""
-    try:
+    with suppress(YamlTextError):
         if new is not None and load_yaml(new) == meant:
             return new
-    except YamlTextError:
-        pass
     words: str = yaml.safe_dump(
         meant, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
     )
     return words
 
 
-def _put(text: str, place: Place, value: Any, order: Sequence[str]) -> str | None:
-    root, words = compose_yaml(text), flow(value)
+def _put(text: str, place: Place, words: str, order: Sequence[str]) -> str | None:
+    """The text with the words of a value at a place; None: they have no place of their own."""
+    root, last = compose_yaml(text), place[-1]
     node, parent = _node(root, place), _node(root, place[:-1])
     if node is not None:
-        start, end = node.start_mark.index, _content_end(node)
+        start, end = node.start_mark.index, _end(node)
         if isinstance(node, yaml.ScalarNode) and node.style in ("|", ">"):
             words += "\n"
         elif isinstance(node, yaml.CollectionNode) and not node.flow_style:
@@ -123,21 +114,21 @@ def _put(text: str, place: Place, value: Any, order: Sequence[str]) -> str | Non
         return None
     is_list = isinstance(parent, yaml.SequenceNode)
     if not is_list:
-        words = f"{place[-1]}: {words}"
+        words = f"{last}: {words}"
     if parent.flow_style:
         end = parent.end_mark.index - 1
         return f"{text[:end].rstrip()}{', ' if parent.value else ''}{words}{text[end:]}"
     margin = " " * parent.start_mark.column
-    later = order[order.index(str(place[-1])) + 1 :] if place[-1] in order else ()
+    later = order[order.index(str(last)) + 1 :] if last in order else ()
     for name, _ in () if is_list else parent.value:
         if name.value in later:
             start = name.start_mark.index
             return f"{text[:start]}{words}\n{margin}{text[start:]}"
-    end = _line_end(text, _content_end(parent))
+    end = _line_end(text, parent)
     return f"{text[:end]}\n{margin}{'- ' if is_list else ''}{words}{text[end:]}"
 
 
-def _node(node: Any, place: Sequence[str | int]) -> yaml.Node | None:
+def _node(node: Any, place: Place) -> yaml.Node | None:
     for key in place:
         children: dict[Any, yaml.Node] = {}
         if isinstance(node, yaml.SequenceNode):
@@ -148,17 +139,15 @@ def _node(node: Any, place: Sequence[str | int]) -> yaml.Node | None:
     return node
 
 
-def _content_end(node: yaml.Node) -> int:
+def _end(node: yaml.Node) -> int:
     """Where a node ends without the space and comments that YAML counts to it."""
-    if not isinstance(node, yaml.CollectionNode) or node.flow_style or not node.value:
-        return int(node.end_mark.index)
-    last = node.value[-1]
-    return _content_end(last[1] if isinstance(last, tuple) else last)
+    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        node = last[1] if isinstance(last, tuple) else last
+    return int(node.end_mark.index)
 
 
-def _line_end(text: str, index: int) -> int:
-    """The end of the line of a place, or the place where a line has just begun."""
-    if index > 0 and text[index - 1] == "\n":
-        return index - 1
-    end = text.find("\n", index)
+def _line_end(text: str, node: yaml.Node) -> int:
+    """The end of the line where a node ends, or that before, where it ends at a line's start."""
+    end = text.find("\n", _end(node) - 1)
     return len(text) if end < 0 else end

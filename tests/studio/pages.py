@@ -11,6 +11,7 @@ from cdpr_drake.cli.studio import verbs
 from cdpr_drake.studio.folder import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
+from cdpr_drake.studio.yaml_edit import with_value
 
 LONGEST = 1200.0
 """Nothing here takes as long, unless it hangs [s]."""
@@ -134,3 +135,8 @@ def problems(user):
         labels = ElementFilter(kind=ui.label)
         said = [label.text for label in labels if "problem" in " ".join(label.classes)]
     return [words for words in [*said, *user.notify.messages] if words]
+
+
+def put(document, place, value):
+    """Changes one value of a document."""
+    document.change(with_value(document.text, place, value))
