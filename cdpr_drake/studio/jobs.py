@@ -187,19 +187,18 @@ class Job:
             try:
                 while process.returncode is None:
                     await asyncio.sleep(LOOK_PERIOD)
-                    self._hear(err)
+                    self._hear(await asyncio.to_thread(_tail, err))
             finally:
                 if process.returncode is None:  # the event loop is ending
                     self._wish = signal.SIGKILL
                     self._signal()
                     await process.wait()
-            self._output = os.pread(out, LARGEST_OUTPUT, 0)
+            self._output = await asyncio.to_thread(os.pread, out, LARGEST_OUTPUT, 0)
         self._end(process.returncode)
 
-    def _hear(self, err: int) -> None:
+    def _hear(self, said: str) -> None:
         """Takes what was said, the newest of it where it is much."""
-        tail = os.pread(err, LARGEST_TAIL, max(os.fstat(err).st_size - LARGEST_TAIL, 0))
-        lines = [_short(line.rstrip()) for line in tail.decode(errors="replace").split("\n")]
+        lines = [_short(line.rstrip()) for line in said.split("\n")]
         self.lines = [line for line in lines if line and progress_of(line) is None]
         self.progress = next(filter(None, map(progress_of, reversed(lines))), self.progress)
 
@@ -232,6 +231,12 @@ def reason(lines: Sequence[str], code: int) -> str:
         name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
         return f"the process was ended by {name}"
     return f"exit code {code}: {lines[-1] if lines else 'it said nothing'}"
+
+
+def _tail(file: int) -> str:
+    """The end of a file that a process writes."""
+    start = max(os.fstat(file).st_size - LARGEST_TAIL, 0)
+    return os.pread(file, LARGEST_TAIL, start).decode(errors="replace")
 
 
 def _short(line: str) -> str:

@@ -115,7 +115,7 @@ async def _save(bench: Workbench) -> None:
     if not bench.file:
         await save_dialog(bench)
         return
-    bench.save(bench.file, overwrite=True)
+    await bench.save(bench.file, overwrite=True)
     notify(f"saved as {bench.file}", "positive")
 
 
@@ -123,7 +123,7 @@ async def save_dialog(bench: Workbench) -> None:
     """Asks for a name in the folder."""
 
     async def save() -> None:
-        bench.save(str(name.value or ""), replace.value)
+        await bench.save(str(name.value or ""), replace.value)
         notify(f"saved as {name.value}", "positive")
 
     with dialog(f"Save in {bench.folder.root}", "Save", save) as attempt:

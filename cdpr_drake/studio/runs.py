@@ -151,8 +151,8 @@ class RunJob(Job):
         if len(self.samples) > MOST_SAMPLES:
             self.samples, self._stride = self.samples[::2], 2 * self._stride
 
-    def _hear(self, err: int) -> None:
-        super()._hear(err)
+    def _hear(self, said: str) -> None:
+        super()._hear(said)
         if self.samples:  # they say more
             sample = self.samples[-1]
             self.progress = min(sample["t"] / self.end, 1.0), _progress_words(sample)

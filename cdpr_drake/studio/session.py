@@ -169,7 +169,7 @@ class Workbench:
         self._opened[opened.path] = opened
         self.robot.change(opened.text, opened.path)
 
-    def save(self, name: str, overwrite: bool) -> None:
+    async def save(self, name: str, overwrite: bool) -> None:
         """Writes the robot's file into the folder, and works with that.
 
         Raises:
@@ -177,9 +177,14 @@ class Workbench:
         """
         if not name.lower().endswith((".yaml", ".yml")):
             raise CdprError(f"name: found {name[:80]!r}; accepted: one that ends in .yaml")
-        path, text = self.folder.path(name), self.robot.text
-        self.files.read(text, path)  # it may name files that are not there
-        self.folder.write(name, text, overwrite or name == self.file)
+        text, overwrite = self.robot.text, overwrite or name == self.file
+
+        def write() -> Path:
+            path = self.folder.path(name)
+            self.files.read(text, path)  # it may name files that are not there
+            return self.folder.write(name, text, overwrite)
+
+        path = await asyncio.to_thread(write)
         self._opened[path] = OpenedRobot(text, path, self.assumed, self.folder.shown(path))
         self.robot.belongs_to(path)
 

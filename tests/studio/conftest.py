@@ -113,7 +113,7 @@ READ_IN_LOOP: list[str] = []
 
 
 HANDLERS = tuple(f"/studio/{name}" for name in ("robot.py", "settings_form", "page",
-                "session", "run.py", "logs", "verb_panel", "views", "plots"))  # fmt: skip
+                "run.py", "logs", "verb_panel", "views", "plots"))  # fmt: skip
 """What calls for reading in a page; a test may read what it likes."""
 
 

@@ -71,7 +71,7 @@ async def test_a_point_is_dragged_and_the_workspace_is_what_the_command_computes
     np.testing.assert_array_equal(alone.answer.tensions, before)
     await drag(alone, THERE, done=True)
     assert alone.robot.value.cables[0].exit_point.tolist() == THERE.tolist()
-    alone.save("moved.yaml", overwrite=False)
+    await alone.save("moved.yaml", overwrite=False)
     sketch = alone.live.sketch
     options = "--grid", ",".join(map(str, sketch.counts)), "--out", tmp_path / "own"
     computed = told(capsys, "workspace", tmp_path / "moved.yaml", *options)["workspaces"]

@@ -149,7 +149,7 @@ async def test_what_an_import_assumed_stays_as_a_card_until_it_is_seen(user, ben
     assert any(line.startswith("assumed ") for line in opened.notes)
     assert shown(user, "assumed")
     assert bench.assumed == opened.notes
-    bench.save("toy.yaml", overwrite=False)
+    await bench.save("toy.yaml", overwrite=False)
     assert bench.assumed == opened.notes
     bench.take_opened(bench.files.open("planar"))
     assert not shown(user, "assumed")

@@ -141,7 +141,7 @@ async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, w
     make_heavier(bench)
     await until(lambda: "save it" in field(user, "run-robot").text)
     await start_is_refused()
-    bench.save("mine.yaml", overwrite=False)
+    await bench.save("mine.yaml", overwrite=False)
     await until(lambda: board.draft.check().robot == str(work / "mine.yaml"))
     user.find(marker="open-own-robot").click()
     await says(f"Runs {ROBOT}, the robot that is open.")
