@@ -148,7 +148,7 @@ def answer_html(answer: PoseAnswer, name: str) -> str:
     pose = ",".join(_shown(float(value)) for value in (*answer.X_WP.translation(), *angles))
     words = f"cdpr tension {shlex.quote(name) if name else 'FILE'} --pose={pose}"
     facts = [
-        ("cables", answer.robot.geometry_words()),
+        ("cables", answer.geometry),
         ("tensions", tensions),
         ("at rest", answer.why_no_rest if rest is None else f"{rest.stability}, elastic cables"),
         *(line.partition(": ")[::2] for line in (rest.lines() if rest is not None else ())),

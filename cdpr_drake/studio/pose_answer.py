@@ -118,6 +118,7 @@ class PoseAnswer:
         slack: True for cables without tension, shape (m,).
         status: Verdict on the tensions; empty without any.
         why_no_tensions: Why there are no tensions; empty: there are, or `status` says it.
+        geometry: Of the cables, in words: what becomes of pulleys.
         rest: Answer of `solve_static`.
         lengths: Of the straight paths between exit and anchor points over pulleys, shape (m,) [m].
         capacity_margin: As `cdpr workspace --measure capacity-margin` [N].
@@ -154,7 +155,9 @@ class PoseAnswer:
         self.rest, self.why_no_rest = _or_refusal(
             lambda: cast("RobotAtRest", solve_static(robot, X_WP))
         )
-        self.lengths, _ = _or_refusal(lambda: cable_paths(X_WP, robot.cable_set()).lengths)
+        cables = robot.cable_set()
+        self.geometry = cables.geometry_words()
+        self.lengths, _ = _or_refusal(lambda: cable_paths(X_WP, cables).lengths)
         place = X_WP.translation()[np.newaxis], X_WP.rotation().matrix()[np.newaxis]
         margin, self.why_no_margin = _or_refusal(
             lambda: MEASURES["capacity-margin"].value(about.conditions, Poses(0, 1, *place))[0]

@@ -48,7 +48,7 @@ POSE_NUMBERS = "pose-numbers"
 LATE = 0.5
 """Time after which numbers that are of the pose before, or the robot before, are called so [s]."""
 
-TELL = 0.1
+TELL = 0.2
 """Time by which the numbers are behind the scene while a point is dragged [s]: a browser builds
 the page anew for each change of it, and would draw the scene only after that.
 """
@@ -216,27 +216,27 @@ class Workbench:
         """Asks about another robot, or the same one after a change."""
         before, self.questions = self.questions.robot, RobotQuestions(robot)
         self.live.follow(robot if robot.name == before.name else None)
-        if robot.name != before.name or robot.motion != before.motion or self._is_outside():
+        if robot.name != before.name or robot.motion != before.motion:
             self.go_home()
+        else:
+            self._put_to(self.coordinates)
+            p, (lower, upper) = self.X_WP.translation(), robot.frame.bounds()
+            if np.any((p < lower) | (p > upper)):
+                self.go_home()
         self.ask()
 
-    def _is_outside(self) -> bool:
-        p, (lower, upper) = self.X_WP.translation(), self.questions.robot.frame.bounds()
-        return bool(np.any((p < lower) | (p > upper)))
-
-    @property
-    def X_WP(self) -> RigidTransform:
-        """The pose of the platform."""
-        return self.questions.pose(self.coordinates)
+    def _put_to(self, coordinates: Sequence[float]) -> None:
+        self.coordinates = [float(value) for value in coordinates]
+        self.X_WP = self.questions.pose(self.coordinates)
 
     def go_home(self) -> None:
         """Puts the platform to the robot's home pose, without asking about it."""
-        self.coordinates = self.questions.coordinates(self.questions.robot.home.transform())
+        self._put_to(self.questions.coordinates(self.questions.robot.home.transform()))
 
     def move_to(self, coordinates: Sequence[float]) -> None:
         """Moves the platform to coordinates, as `RobotQuestions` has them, and asks there."""
         self.is_dragged = False  # also where a browser went away with a point in its hand
-        self.coordinates = [float(value) for value in coordinates]
+        self._put_to(coordinates)
         self.ask()
 
     def ask(self) -> None:
