@@ -21,7 +21,15 @@ from cdpr_drake.studio.numbers import Pair, pair_table, pairs
 from cdpr_drake.studio.panel import COMPARED, RUN, robot_argument, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.runs import NO_RUN, SPEEDS, FinishedRun, RunBoard, RunJob, Sample
+from cdpr_drake.studio.runs import (
+    NO_RUN,
+    SPEEDS,
+    FinishedRun,
+    RunBoard,
+    RunJob,
+    Sample,
+    finished_run,
+)
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import leaves, send_file, show_results
@@ -423,7 +431,7 @@ class RunPanel:
         if entry is None or not entry.is_whole or entry.folder in self._unreadable:
             return None
         try:
-            return await run.io_bound(FinishedRun, entry.folder)
+            return await run.io_bound(finished_run, entry.folder, entry.changed)
         except Exception:
             self._unreadable.add(entry.folder)
             raise

@@ -14,6 +14,7 @@ import zlib
 from asyncio import Future
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from functools import lru_cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
@@ -272,6 +273,12 @@ def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
     )  # fmt: skip
     look_at_robot(scene.meshcat, robot)
     return picture
+
+
+@lru_cache(maxsize=4)
+def finished_run(folder: Path, written: float) -> FinishedRun:
+    """What a run left in a folder at a time; one for all tabs, since each is drawn as another."""
+    return FinishedRun(folder)
 
 
 class RunBoard(Board):

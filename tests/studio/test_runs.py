@@ -93,11 +93,19 @@ def test_a_run_beside_another_has_numbers_of_both(alone):
 
 
 @asynccontextmanager
-async def panel(folder):
+async def panel(folder, drawn=None):
     """A user who has opened the run panel alone, without a scene, and the jobs."""
+
+    def draw(work, done=None):
+        if drawn is not None and done is not None:
+            drawn.append(work)
+            future = asyncio.get_running_loop().create_future()
+            future.set_result(None)
+            done(future)
+
     jobs = JobManager(at_once=1)
     bench = Workbench(WorkingFolder(folder), "acrobot_small", "acrobot_pbvs", jobs=jobs)
-    bench.draw = lambda draw, done=None: None
+    bench.draw = draw
     try:
         async with simulated(lambda: run_panel(bench)) as user:
             await until(lambda: shown(user, "field-duration"))
@@ -114,6 +122,19 @@ async def press(user, name):
     """Clicks a button once it can be."""
     await until(lambda: shown(user, name) and field(user, name).enabled, LONGEST)
     user.find(marker=name).click()
+
+
+async def test_tabs_that_show_the_same_run_do_not_draw_it_in_turns(tmp_path, alone):
+    shutil.copytree(alone, tmp_path / "runs" / "first")
+    drawn = []
+    async with panel(tmp_path, drawn) as (user, _):
+        await until(lambda: field(user, "run").options)
+        field(user, "run").value = "first"
+        await until(lambda: drawn)
+        await user.open("/")
+        await says(user, "outcome", "timeout")
+        await asyncio.sleep(1.0)
+        assert len(drawn) == 1
 
 
 async def test_a_wrong_value_starts_nothing_and_a_run_fails_or_is_found_again(
