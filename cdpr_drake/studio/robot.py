@@ -67,9 +67,8 @@ def robot_panel(bench: Workbench) -> None:
 
 async def _act(bench: Workbench, action: Callable[[Workbench], Awaitable[None]]) -> None:
     """Does something with the robot once what was typed last is in it."""
-    with show_errors():
-        await bench.robot.settled()
-        await action(bench)
+    await bench.robot.settled()
+    await action(bench)
 
 
 async def open_dialog(bench: Workbench) -> None:

@@ -329,11 +329,10 @@ class RunPanel:
         return fits
 
     async def _open_own_robot(self) -> None:
-        with show_errors():
-            assert self._board.draft is not None
-            opened = await run.io_bound(self._bench.files.open, self._board.draft.own_robot)
-            if opened is not None:  # the server is not ending
-                self._bench.take_opened(opened)
+        assert self._board.draft is not None
+        opened = await run.io_bound(self._bench.files.open, self._board.draft.own_robot)
+        if opened is not None:  # the server is not ending
+            self._bench.take_opened(opened)
 
     async def _start(self) -> None:
         self._start_button.props("loading")
@@ -355,9 +354,8 @@ class RunPanel:
 
     def _recover(self) -> None:
         """Writes results of a run that was killed, as far as it was simulated."""
-        with show_errors():
-            words = ["finish", str(self.job.folder), "--json"]
-            self._bench.jobs.submit(Job(words, self.job.working))
+        words = ["finish", str(self.job.folder), "--json"]
+        self._bench.jobs.submit(Job(words, self.job.working))
 
     async def _download(self) -> None:
         if self.entry is not None:
@@ -371,20 +369,19 @@ class RunPanel:
     def _tick(self) -> None:
         """Shows what is new; many times a second."""
         shown, board, is_live = self.run, self._board, isinstance(self.run, RunJob)
-        with show_errors():
-            if self._begun != (shown, shown.charts, self.other):
-                self._begin()
-            elif self._plots.is_ready or not is_live:
-                newest = self._plots.newest
-                new = [plot_row(sample) for sample in shown.samples if sample["t"] > newest]
-                if new:
-                    self._plots.put(new)
-                self._look()
-            if self._bench.panel not in ("", "run"):
-                board.give_back()
-            elif shown.scenario is not None and self._sample is not None:
-                wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE) if is_live else 0.0
-                board.draw(shown, self._sample, wait)
+        if self._begun != (shown, shown.charts, self.other):
+            self._begin()
+        elif self._plots.is_ready or not is_live:
+            newest = self._plots.newest
+            new = [plot_row(sample) for sample in shown.samples if sample["t"] > newest]
+            if new:
+                self._plots.put(new)
+            self._look()
+        if self._bench.panel not in ("", "run"):
+            board.give_back()
+        elif shown.scenario is not None and self._sample is not None:
+            wait = min(SCENE_SHARE * self._plots.lag, RAREST_SCENE) if is_live else 0.0
+            board.draw(shown, self._sample, wait)
 
     def _begin(self) -> None:
         """Shows all that is there, as after a change, or in a browser that shows it anew."""
@@ -412,19 +409,18 @@ class RunPanel:
         self._sample = sample
 
     async def _slow_tick(self) -> None:
-        with show_errors():
-            other = self._refresh()
-            if other is None or self.other is None or other.folder != self.other.folder:
-                self.other = await self._read(other)
-            entry, board = self.entry, self._board
-            if self.job.state.is_over and not isinstance(self.run, FinishedRun):
-                done = await self._read(entry)
-                if done is not None and _identity(entry) == _identity(self.entry):
-                    self.run = done
-                    board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
-                    self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
-            self._bench.results.show(RUN, self.run.subject)
-            self._bench.results.show(COMPARED, self.other.subject if self.other else None)
+        other = self._refresh()
+        if other is None or self.other is None or other.folder != self.other.folder:
+            self.other = await self._read(other)
+        entry, board = self.entry, self._board
+        if self.job.state.is_over and not isinstance(self.run, FinishedRun):
+            done = await self._read(entry)
+            if done is not None and _identity(entry) == _identity(self.entry):
+                self.run = done
+                board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
+                self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
+        self._bench.results.show(RUN, self.run.subject)
+        self._bench.results.show(COMPARED, self.other.subject if self.other else None)
 
     async def _read(self, entry: Entry | None) -> FinishedRun | None:
         """What a run left; None: nothing, or what cannot be read, which is said once."""

@@ -118,21 +118,20 @@ class VerbPanel:
                 )  # fmt: skip
 
     async def _start(self) -> None:
-        with show_errors():
-            if self._form is None:
-                return
-            verb, given, about = self._form.verb, self._verbs.given(), {}
-            names = [_stem(value) for value in given.values()]
-            if verb.needs_robot:
-                given["robot"], now = robot_argument(self._bench), self._bench.subject
-                about = {"robot": now.robot, "digest": now.digest}
-                names.append(now.robot)
-            if words := await self._form.words(given):
-                if len(self._verbs.names) != 1:
-                    names.append(verb.title)
-                name = "-".join(names) or _stem(words[-1])
-                self._job = await self._board.start(verb, words, name, about)
-                self._refresh()
+        if self._form is None:
+            return
+        verb, given, about = self._form.verb, self._verbs.given(), {}
+        names = [_stem(value) for value in given.values()]
+        if verb.needs_robot:
+            given["robot"], now = robot_argument(self._bench), self._bench.subject
+            about = {"robot": now.robot, "digest": now.digest}
+            names.append(now.robot)
+        if words := await self._form.words(given):
+            if len(self._verbs.names) != 1:
+                names.append(verb.title)
+            name = "-".join(names) or _stem(words[-1])
+            self._job = await self._board.start(verb, words, name, about)
+            self._refresh()
 
     def _choose(self) -> None:
         if self._choice.value and self._choice.value != self._board.shown:
@@ -150,11 +149,10 @@ class VerbPanel:
         self._refresh()
 
     async def _ask_to_go_on(self) -> None:
-        with show_errors():
-            entry = self._board.shown_entry()
-            if entry is not None:
-                await self._board.go_on(entry, self._bench.commands, self._bench.folder)
-            self._refresh()
+        entry = self._board.shown_entry()
+        if entry is not None:
+            await self._board.go_on(entry, self._bench.commands, self._bench.folder)
+        self._refresh()
 
     def _refresh(self) -> Entry | None:
         """Follows jobs and folders; returns what is looked at."""
@@ -182,18 +180,17 @@ class VerbPanel:
         return entry
 
     async def _tick(self) -> None:
-        with show_errors():
-            entry = self._refresh()
-            if self._job is not None and self._job.state.is_over:
-                job, self._job = self._job, None
-                refused = job.message if job.state == JobState.FAILED else ""
-                if refused and (self._form is None or not self._form.say(refused)):
-                    notify(refused)
-            whole = entry if entry is not None and entry.is_whole else None
-            stamp = (None, 0.0) if whole is None else (whole.folder, whole.changed)
-            if stamp != self._shown:
-                self._shown = stamp
-                await self._place_results(whole)
+        entry = self._refresh()
+        if self._job is not None and self._job.state.is_over:
+            job, self._job = self._job, None
+            refused = job.message if job.state == JobState.FAILED else ""
+            if refused and (self._form is None or not self._form.say(refused)):
+                notify(refused)
+        whole = entry if entry is not None and entry.is_whole else None
+        stamp = (None, 0.0) if whole is None else (whole.folder, whole.changed)
+        if stamp != self._shown:
+            self._shown = stamp
+            await self._place_results(whole)
 
     async def _place_results(self, entry: Entry | None) -> None:
         """Reads results in another thread, places them, and says what they are about."""

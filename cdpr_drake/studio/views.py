@@ -261,7 +261,7 @@ def place_figure(path: Path, style: str = WHOLE) -> None:
     place = ui.element("div").classes("w-full")
 
     async def fill() -> None:
-        with place, show_errors():
+        with place:
             place_image(await _shown(path), path, style)
 
     ui.timer(0.0, fill, once=True)
@@ -283,7 +283,7 @@ def _place_page(name: str, path: Path) -> None:
 
     async def fill() -> None:
         if fold.value and not place.default_slot.children:
-            with place, show_errors():
+            with place:
                 page = (await _shown(path)).decode("utf-8", "replace")
                 frame = ui.element("iframe").classes("w-full").style("height:70vh;border:0")
                 frame.props["srcdoc"], frame.props["title"] = page, name
@@ -308,10 +308,9 @@ async def _shown(path: Path) -> bytes:
 
 async def send_file(path: Path) -> None:
     """Hands over a file to the browser, or a folder as a zip archive; another thread reads it."""
-    with show_errors():
-        if not path.exists():
-            raise CdprError(f"{path.name}: is not there any more")
-        read, ending = (zipped, ".zip") if path.is_dir() else (Path.read_bytes, "")
-        content = await run.io_bound(read, path)
-        if content is not None:  # the server is not ending
-            ui.download(content, path.name + ending)
+    if not path.exists():
+        raise CdprError(f"{path.name}: is not there any more")
+    read, ending = (zipped, ".zip") if path.is_dir() else (Path.read_bytes, "")
+    content = await run.io_bound(read, path)
+    if content is not None:  # the server is not ending
+        ui.download(content, path.name + ending)
