@@ -6,7 +6,7 @@ import asyncio
 import re
 import secrets
 import socket
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterable, Awaitable, Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, suppress
 from pathlib import Path
@@ -32,6 +32,9 @@ IS_TOKEN = re.compile(r"[A-Za-z0-9._~-]{16,200}")
 
 LARGEST_MESSAGE = 64_000_000
 """Of a scene [bytes]; meshes come in one message."""
+
+MOST_BEHIND = 8_000_000
+"""By which a browser that had the scene may be behind its changes [bytes]."""
 
 STYLE, SCRIPT = ((Path(__file__).parent / name).read_bytes() for name in ("scene.css", "scene.js"))
 TYPES = {".js": "text/javascript", ".html": "text/html", ".ico": "image/x-icon"}
@@ -193,9 +196,9 @@ def _relay_scene(app: FastAPI) -> None:
                 await _scene(socket) as scene,
                 scene.ws_connect("http://scene/", max_msg_size=LARGEST_MESSAGE) as meshcat,
             ):
-                async for message in meshcat:
-                    if message.type == aiohttp.WSMsgType.BINARY:
-                        await socket.send_bytes(message.data)
+                binary = aiohttp.WSMsgType.BINARY
+                scenes = (message.data async for message in meshcat if message.type == binary)
+                await hand_on(scenes, socket.send_bytes)
 
         async def up() -> None:
             while (await socket.receive())["type"] != "websocket.disconnect":
@@ -210,6 +213,36 @@ def _relay_scene(app: FastAPI) -> None:
             await asyncio.gather(*both, return_exceptions=True)
         with suppress(RuntimeError, WebSocketDisconnect):  # the browser has gone already
             await socket.close()
+
+
+async def hand_on(
+    messages: AsyncIterable[bytes], send: Callable[[bytes], Awaitable[object]]
+) -> None:
+    """Hands on messages, which are taken at once: Meshcat keeps all that is not, without a limit.
+
+    It ends with them, or where who gets them is too far behind: a browser then connects anew, and
+    gets the scene whole, once.
+    """
+    waiting: asyncio.Queue[bytes] = asyncio.Queue()
+    behind, most = 0, LARGEST_MESSAGE
+
+    async def give() -> None:
+        nonlocal behind, most
+        while True:
+            message = await waiting.get()
+            await send(message)
+            behind -= len(message)
+            if behind == 0:  # it has the scene
+                most = MOST_BEHIND
+
+    async with asyncio.TaskGroup() as group:
+        giving = group.create_task(give())
+        async for message in messages:
+            waiting.put_nowait(message)
+            behind += len(message)
+            if behind > most:
+                break
+        giving.cancel()
 
 
 async def _scene(request: HTTPConnection) -> aiohttp.ClientSession:

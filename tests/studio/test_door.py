@@ -11,6 +11,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.door import BENCH, MOST_SESSIONS, Door, Sessions
 from cdpr_drake.studio.page import SCENE
+from cdpr_drake.studio.server import LARGEST_MESSAGE, MOST_BEHIND, hand_on
 from tests.messages import printed
 from tests.studio.pages import until
 from tests.studio.served import served
@@ -250,3 +251,38 @@ def test_a_token_that_is_set_is_not_printed(tmp_path, monkeypatch):
         for query, status in ("", 403), (f"?token={TOKEN}", 200), (f"?token={TOKEN}x", 403):
             assert httpx.get(address + query, timeout=600.0).status_code == status
     assert TOKEN not in "".join(process.said)
+
+
+@pytest.mark.parametrize("had_scene", [False, True])
+async def test_a_browser_that_takes_no_more_of_a_scene_is_let_go(had_scene):
+    piece, taken = bytes(1_000_000), []
+
+    async def scene():
+        for _ in range(200):
+            taken.append(piece)
+            yield piece
+            await asyncio.sleep(0)
+
+    async def send(_):
+        if not had_scene or len(taken) > 3:
+            await asyncio.Event().wait()
+
+    await hand_on(scene(), send)
+    most = MOST_BEHIND if had_scene else LARGEST_MESSAGE
+    assert most < len(taken) * len(piece) < most + 5 * len(piece)
+
+
+async def test_a_browser_gets_all_of_a_scene_in_order():
+    got, pieces = [], [bytes([k]) for k in range(100)]
+
+    async def scene():
+        for piece in pieces:
+            yield piece
+            await asyncio.sleep(0)
+        await until(lambda: len(got) == len(pieces))
+
+    async def send(piece):
+        got.append(piece)
+
+    await hand_on(scene(), send)
+    assert got == pieces
