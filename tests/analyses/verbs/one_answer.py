@@ -20,7 +20,7 @@ from cdpr_drake.geometry.poses import angles_from_rotation, pose_error, pose_fro
 from cdpr_drake.models.robot_holding import rest_as_long
 from cdpr_drake.models.robot_loader import load_robot, robot_names
 from cdpr_drake.models.robot_statics import tension_problem
-from cdpr_drake.studio.pose_answer import RobotQuestions
+from cdpr_drake.studio.pose_answer import PoseAnswer, RobotQuestions
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
 
@@ -199,10 +199,10 @@ def by_equilibria(robot, X_WP, pulleys):
 
 def by_studio(robot, X_WP, pulleys):
     assert pulleys
-    answer = RobotQuestions(robot).at(X_WP)
+    answer = PoseAnswer(RobotQuestions(robot), X_WP)
     told = {answer.status == "feasible", answer.rest is not None}
     words = f"{answer.why_no_tensions} {answer.why_no_rest}"
-    return Answer(told.pop() if len(told) == 1 else None, words, answer.robot.geometry_words())
+    return Answer(told.pop() if len(told) == 1 else None, words, answer.geometry)
 
 
 CALLS = {
