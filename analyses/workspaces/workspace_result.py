@@ -121,10 +121,14 @@ class Workspace(GridResult):
     def _regions(self) -> list[str]:
         return [*self.holds, ALL] if len(self.holds) > 1 else list(self.holds)
 
+    def title(self, kind: str) -> str:
+        """What a kind is, in words, or what all have in common."""
+        return KINDS[kind].title if kind in KINDS else "all of these"
+
     def _numbers(self, kind: str) -> dict[str, Any]:
         inside = self.inside(kind)
         return {
-            "title": KINDS[kind].title if kind in KINDS else "all of these",
+            "title": self.title(kind),
             "pose_share": float(np.mean(inside)),
             **region_numbers(inside, self.places(kind), self.grid.axes),
         }

@@ -8,7 +8,7 @@ limits, mass and wrench of the workspace; if none do, its cables are grey.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from pydrake.geometry import Rgba
@@ -17,6 +17,7 @@ from cdpr_drake.analyses.reporting.deferred_figures import Pictures
 from cdpr_drake.analyses.visualization.replay import RobotPicture
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.analyses.workspaces.conditions import ALL
+from cdpr_drake.analyses.workspaces.servo_stability import KINDS as STABILITY_KINDS
 from cdpr_drake.arrays import Array
 from cdpr_drake.errors import CdprError, InfeasibleTensionError
 from cdpr_drake.models.robot_schema import Robot
@@ -24,7 +25,8 @@ from cdpr_drake.models.robot_statics import tension_problem
 from cdpr_drake.palette import WORKSPACES, Look, rgb
 from cdpr_drake.tensions.methods import exact_tensions
 from cdpr_drake.workspaces.hull import WorkspaceHull
-from cdpr_drake.workspaces.volume import surface_quads, triangles
+from cdpr_drake.workspaces.pose_grid import WorkspaceGrid
+from cdpr_drake.workspaces.volume import WorkspaceVolume, surface_quads, triangles
 
 if TYPE_CHECKING:
     from cdpr_drake.analyses.workspaces.stability import Stability
@@ -55,57 +57,88 @@ Mesh = tuple[Array, np.ndarray]
 """Vertices, shape (n, 3) [m], and triangles, shape (k, 3); none of what is empty."""
 
 
+class Layer(NamedTuple):
+    """A solid of a workspace.
+
+    Attributes:
+        name: Of the workspace; a path in the scene.
+        title: What it is, in words.
+        share: Of the grid's volume, or of the poses that boxes fill, in words.
+        volume: Of the cells whose corners are all inside, of the hull, or of the boxes, in words.
+        mesh: Its surface.
+        color: Of the surface.
+    """
+
+    name: str
+    title: str
+    share: str
+    volume: str
+    mesh: Mesh
+    color: Rgba
+
+
 def workspace_page(
-    workspace: Workspace, robot: Robot, more: Sequence[tuple[str, Mesh, Rgba]] = ()
+    workspace: Workspace, robot: Robot, more: Sequence[Layer] = ()
 ) -> tuple[Pictures, str]:
-    """What writes the page of a workspace, and what should be known of it; `more` are solids."""
-    solids = workspace_solids(workspace)
+    """What writes the page of a workspace, and what should be known of it."""
+    layers = workspace_layers(workspace)
     if workspace.hull is not None:
-        solids.append(("hull", *hull_solid(workspace.hull)))
-    solids += more
+        layers.append(hull_layer(workspace.hull))
     title = f"{workspace.arguments['robot']}: workspaces, {workspace.geometry}"
     if workspace.is_tilted():
         title = f"axes: {workspace.axes_words()}"
-    return _page(robot, workspace.arguments["statics"], title, solids)
+    return _page(robot, workspace.arguments["statics"], title, [*layers, *more])
 
 
 def stability_page(stability: Stability, robot: Robot) -> tuple[Pictures, str]:
     """What writes the page of stability workspaces, and what should be known of it."""
-    solids = [
-        (f"{name}/{kind}" if kind != "S" else "S", mesh, color)
-        for name, kind, mesh, color in stability_solids(stability)
-    ]
     title = f"{robot.name}: stability of the servo, {stability.geometry}"
-    return _page(robot, stability.arguments["statics"], title, solids)
+    return _page(robot, stability.arguments["statics"], title, stability_layers(stability))
 
 
-def workspace_solids(workspace: Workspace) -> list[tuple[str, Mesh, Rgba]]:
+def workspace_layers(workspace: Workspace) -> list[Layer]:
     """What all kinds have in common, if there are several, and each kind."""
     names = [ALL, *workspace.holds] if len(workspace.holds) > 1 else list(workspace.holds)
     colors = [*COLORS, *[COLORS[-1]] * len(names)]
     return [
-        (name, triangles(surface_quads(workspace.places(name), workspace.grid.axes)), color)
+        _grid_layer(
+            name, workspace.title(name), workspace.volume(name), workspace.places(name),
+            workspace.grid, color,
+        )
         for name, color in zip(names, colors, strict=False)
-    ]
+    ]  # fmt: skip
 
 
-def stability_solids(stability: Stability) -> list[tuple[str, str, Mesh, Rgba]]:
-    """Bounds and kind of each workspace, and its mesh; S once, for the first bounds."""
+def stability_layers(stability: Stability) -> list[Layer]:
+    """Each kind of workspace under each bounds; S once, for the first bounds."""
     return [
-        (name, kind, triangles(surface_quads(stability.places(kind, name), stability.grid.axes)),
-         color)
+        _grid_layer(
+            kind if kind == "S" else f"{name}/{kind}",
+            STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {name}"),
+            stability.volume(kind, bounds=name), stability.places(kind, name), stability.grid,
+            color,
+        )
         for name in stability.names for kind, color in STABILITY_COLORS.items()
         if kind != "S" or name == stability.names[0]
     ]  # fmt: skip
 
 
-def hull_solid(hull: WorkspaceHull) -> tuple[Mesh, Rgba]:
-    """A hull and its colour."""
-    return (hull.vertices, hull.faces), HULL_COLOR
+def _grid_layer(
+    name: str, title: str, volume: WorkspaceVolume, places: np.ndarray, grid: WorkspaceGrid,
+    color: Rgba,
+) -> Layer:  # fmt: skip
+    share, size = f"{100.0 * volume.share:.2f} %", f"{volume.value:.4g} {volume.unit}"
+    return Layer(name, title, share, size, triangles(surface_quads(places, grid.axes)), color)
+
+
+def hull_layer(hull: WorkspaceHull) -> Layer:
+    """What is seen of a workspace from a centre."""
+    title, volume = "what is seen of it from a centre, by rays", f"{hull.volume:.4g} m^3"
+    return Layer("hull", title, "–", volume, (hull.vertices, hull.faces), HULL_COLOR)
 
 
 def _page(
-    robot: Robot, statics: Mapping[str, Any], title: str, solids: Sequence[tuple[str, Mesh, Rgba]]
+    robot: Robot, statics: Mapping[str, Any], title: str, layers: Sequence[Layer]
 ) -> tuple[Pictures, str]:
     """The page, with the first solid visible; words if cables are grey, or if there is no page."""
     from matplotlib.colors import to_hex  # half a second, which a scene needs not
@@ -119,13 +152,15 @@ def _page(
     except CdprError as undrawn:
         return {}, f"{PAGE} is left out, the robot cannot be drawn at home: {undrawn}"
     picture.title = title
-    for number, (path, mesh, color) in enumerate(solids):
-        if len(mesh[1]):
-            first = number == 0
-            add_solid(picture.meshcat, f"workspaces/{path}", *mesh, color, visible=first)
+    for number, layer in enumerate(layers):
+        if len(layer.mesh[1]):
+            first, color = number == 0, layer.color
+            add_solid(
+                picture.meshcat, f"workspaces/{layer.name}", *layer.mesh, color, visible=first
+            )
             if first:
                 hexadecimal = to_hex((color.r(), color.g(), color.b()))
-                picture.explain(f"workspace {path}", Look(hexadecimal))
+                picture.explain(f"workspace {layer.name}", Look(hexadecimal))
     note = f"{PAGE} shows the robot at home without tensions: {problem}" if problem else ""
     return {PAGE: lambda path: path.write_text(picture.html(), encoding="utf-8")}, note
 

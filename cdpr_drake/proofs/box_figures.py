@@ -16,7 +16,7 @@ from cdpr_drake.analyses.frame.figures import line_style, new_figure, panels
 from cdpr_drake.analyses.workspaces import workspace_figures
 from cdpr_drake.analyses.workspaces.plane_panels import CORNERS
 from cdpr_drake.analyses.workspaces.workspace_figures import LINE
-from cdpr_drake.analyses.workspaces.workspace_scene import Mesh
+from cdpr_drake.analyses.workspaces.workspace_scene import Layer, Mesh
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import nth_look
 from cdpr_drake.proofs.box_expansion_kernel import INSIDE, OPEN, OUTSIDE
@@ -99,21 +99,24 @@ def box_planes_figure(boxes: CertifiedBoxes, robot: str, kinds: Sequence[str]) -
     return figure
 
 
-def box_solids(boxes: CertifiedBoxes) -> list[tuple[str, str, Mesh, Rgba]]:
-    """Boxes by what is proven of them: its name, how many, mesh of the largest, colour.
-
-    A verdict without a box is left out.
-    """
-    solids = []
+def box_layers(boxes: CertifiedBoxes) -> list[Layer]:
+    """Boxes by what is proven of them, the largest; a verdict without a box is left out."""
+    sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
+    is_turned = np.any(sizes[3:] > 0.0)  # boxes of several orientations lie upon each other
+    layers = []
     for name, (verdict, color) in VERDICTS.items():
         numbers = np.flatnonzero(boxes.verdicts == verdict)
         volumes = np.prod(np.where(boxes.halves > 0.0, boxes.halves, 1.0)[numbers], axis=1)
         largest = numbers[np.argsort(-volumes, kind="stable")[:MOST_BOXES]]
         if len(largest):
-            words = f"the largest {len(largest)} of {len(numbers)}"
+            proven = "nothing is proven" if name == "open" else f"proven {name}"
+            title = f"{proven}, the largest {len(largest)} of {len(numbers)}"
+            share = float(getattr(boxes, name))
+            volume = "–" if is_turned else f"{share * np.prod(sizes[:3]):.4g} m^3"
             mesh = _cuboids(boxes.poses[largest, :3], boxes.halves[largest, :3])
-            solids.append((name, words, mesh, color))
-    return solids
+            words = f"{100.0 * share:.2f} %"
+            layers.append(Layer(f"boxes {name}", title, words, volume, mesh, color))
+    return layers
 
 
 def _cuboids(middles: Array, halves: Array) -> Mesh:

@@ -369,12 +369,11 @@ class CertifiedWorkspace(Workspace):
     def page(self, robot: Robot) -> tuple[Pictures, str]:
         """As a workspace's, with the boxes."""
         from cdpr_drake.analyses.workspaces.workspace_scene import workspace_page
-        from cdpr_drake.proofs.box_figures import box_solids
+        from cdpr_drake.proofs.box_figures import box_layers
 
-        solids = box_solids(self.boxes)
-        return workspace_page(
-            self, robot, [(f"boxes/{name}, {words}", *rest) for name, words, *rest in solids]
-        )
+        layers = box_layers(self.boxes)
+        named = [layer._replace(name=f"boxes/{layer.title}") for layer in layers]
+        return workspace_page(self, robot, named)
 
 
 def certified(

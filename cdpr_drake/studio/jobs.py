@@ -127,7 +127,10 @@ class Job:
         self.set_state(JobState.RUNNING)
 
     async def _run(self) -> None:
-        await self._work()
+        try:
+            await self._work()
+        except (OSError, ValueError) as problem:  # a full disk, say
+            self.set_state(JobState.FAILED, f"cannot be started: {problem}")
         await asyncio.to_thread(self.put_away, self)
 
     def stop(self, wish: signal.Signals = signal.SIGTERM) -> None:
@@ -160,29 +163,25 @@ class Job:
 
     async def _work(self) -> None:
         """Runs the process to its end, and keeps what it says."""
-        with ExitStack() as stack:
+        with ExitStack() as stack, ExitStack() as given:
+            for descriptor in self.descriptors:
+                given.callback(os.close, descriptor)
             files = [await asyncio.to_thread(tempfile.TemporaryFile) for _ in range(2)]
             out, err = (stack.enter_context(file).fileno() for file in files)
             # See `cli.process.exit_with_parent`; no other child inherits it.
             theirs, self._lifeline = os.pipe()
+            given.callback(os.close, theirs)
             stack.callback(os.close, self._lifeline)
-            self.descriptors += (theirs,)
             own = {
                 "PYTHONPATH": os.pathsep.join(filter(None, (HOME, os.environ.get("PYTHONPATH")))),
                 PROGRESS_PERIOD: "1", "CDPR_LIFELINE": str(theirs),
             }  # fmt: skip
-            try:
-                process = self._process = await asyncio.create_subprocess_exec(
-                    *self.program, *self.arguments, cwd=self.working, env=os.environ | own,
-                    stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
-                    pass_fds=self.descriptors, start_new_session=True,
-                )  # fmt: skip
-            except (OSError, ValueError) as problem:
-                self.set_state(JobState.FAILED, f"cannot be started: {problem}")
-                return
-            finally:
-                for descriptor in self.descriptors:
-                    os.close(descriptor)
+            process = self._process = await asyncio.create_subprocess_exec(
+                *self.program, *self.arguments, cwd=self.working, env=os.environ | own,
+                stdin=asyncio.subprocess.DEVNULL, stdout=out, stderr=err,
+                pass_fds=(*self.descriptors, theirs), start_new_session=True,
+            )  # fmt: skip
+            given.close()
             self._signal()
             try:
                 while process.returncode is None:

@@ -61,7 +61,7 @@ class Logs(Verbs):
 
     def given(self) -> dict[str, str]:
         """The log."""
-        return {"log": str(self.bench.folder.path(self.log)) if self.log else ""}
+        return {"log": str(self.bench.folder.root / self.log) if self.log else ""}
 
     async def show(self, view: View) -> None:
         """Places a comparison as curves, then all else that there is of it."""
@@ -78,8 +78,7 @@ class Logs(Verbs):
 def logs_panel(bench: Workbench) -> None:
     """Places the logs panel."""
     logs = bench.kept(Logs)
-    files = log_files(bench.folder)
-    chosen = ui.select(files, label="log in the working folder", with_input=True)
+    chosen = ui.select([], label="log in the working folder", with_input=True)
     chosen.props("dense outlined").classes("w-full").mark("log")
     contents = ui.element("div").classes("w-full").mark("log-contents")
     panel = VerbPanel(logs)
@@ -103,7 +102,6 @@ def logs_panel(bench: Workbench) -> None:
 
     panel.start.set_enabled(False)
     chosen.on_value_change(choose)
-    chosen.value = logs.log or None
     ui.timer(TICK, follow)
 
 

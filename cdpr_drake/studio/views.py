@@ -301,16 +301,23 @@ async def _shown(path: Path) -> bytes:
     Raises:
         CdprError: It is too large for a page.
     """
-    if path.stat().st_size > LARGEST_SHOWN:
-        raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
-    return await run.io_bound(path.read_bytes) or b""
+
+    def read() -> bytes:
+        if path.stat().st_size > LARGEST_SHOWN:
+            raise CdprError(f"{path.name}: too large to be shown; it is in {path.parent.name}")
+        return path.read_bytes()
+
+    return await run.io_bound(read) or b""
 
 
 async def send_file(path: Path) -> None:
     """Hands over a file to the browser, or a folder as a zip archive; another thread reads it."""
-    if not path.exists():
-        raise CdprError(f"{path.name}: is not there any more")
-    read, ending = (zipped, ".zip") if path.is_dir() else (Path.read_bytes, "")
-    content = await run.io_bound(read, path)
+
+    def read() -> tuple[bytes, str]:
+        if path.is_dir():
+            return zipped(path), f"{path.name}.zip"
+        return path.read_bytes(), path.name
+
+    content = await run.io_bound(read)
     if content is not None:  # the server is not ending
-        ui.download(content, path.name + ending)
+        ui.download(*content)

@@ -6,33 +6,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from nicegui import run, ui
-from pydrake.geometry import Meshcat, Rgba
+from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.visualization.solids import add_solid
 from cdpr_drake.analyses.workspaces.conditions import MEASURES
-from cdpr_drake.analyses.workspaces.servo_stability import KINDS as STABILITY_KINDS
 from cdpr_drake.analyses.workspaces.stability import load_stability
 from cdpr_drake.analyses.workspaces.workspace_hulls import load_hull
 from cdpr_drake.analyses.workspaces.workspace_result import load_workspace
 from cdpr_drake.analyses.workspaces.workspace_scene import (
-    Mesh,
-    hull_solid,
-    stability_solids,
-    workspace_solids,
+    Layer,
+    hull_layer,
+    stability_layers,
+    workspace_layers,
 )
 from cdpr_drake.arrays import Array
 from cdpr_drake.palette import TENSIONS, rgb
-from cdpr_drake.proofs.box_figures import box_solids
+from cdpr_drake.proofs.box_figures import box_layers
 from cdpr_drake.proofs.certified_workspace import load_boxes
 from cdpr_drake.studio.panel import WORKSPACES, show_errors
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import VerbPanel, Verbs
 from cdpr_drake.studio.views import View, read_numbers
-from cdpr_drake.workspaces.volume import WorkspaceVolume
 
 REGIONS, PLANE = "workspaces", "workspaces/plane"
 """Paths in the scene: of all solids, and of the plane with colours."""
@@ -42,27 +40,6 @@ UNKNOWN = (0.6, 0.6, 0.6)
 
 AXES = "xyz"
 NOTHING = "none"
-
-
-class Layer(NamedTuple):
-    """One workspace that can be shown.
-
-    Attributes:
-        name: Of the workspace.
-        title: What it is, in words.
-        share: Of the grid's volume, or of the poses that boxes fill, in words.
-        volume: Of the cells whose corners are all inside, of the hull, or of the boxes, as the
-            command prints it, in words.
-        solid: Its mesh, which may have no triangle.
-        color: Of the solid.
-    """
-
-    name: str
-    title: str
-    share: str
-    volume: str
-    solid: Mesh
-    color: Rgba
 
 
 @dataclass(frozen=True)
@@ -107,49 +84,23 @@ def read_regions(folder: Path) -> Regions:
     Raises:
         CdprError: There are none that can be read.
     """
-    summary, layers = read_numbers(folder), []
+    summary = read_numbers(folder)
     result: Any
     if isinstance(summary.get("workspaces"), list):
         result = load_stability(folder)
-        for bounds, kind, *drawn in stability_solids(result):
-            title = STABILITY_KINDS[kind] + ("" if kind == "S" else f", bounds {bounds}")
-            measured = _words(result.volume(kind, bounds=bounds))
-            layers.append(Layer(f"{bounds} {kind}", title, *measured, *drawn))
+        layers = stability_layers(result)
         names = [f"margin, bounds {name}" for name in result.names]
         values, units = dict(zip(names, result.margin, strict=True)), dict.fromkeys(names, "-")
     else:
         result = load_workspace(folder)
-        for name, *drawn in workspace_solids(result):
-            title = summary["workspaces"][name]["title"]
-            layers.append(Layer(name, title, *_words(result.volume(name)), *drawn))
+        layers = workspace_layers(result)
         values, units = result.values, {name: MEASURES[name].unit for name in result.values}
     if "hull" in summary:
-        hull = load_hull(folder)
-        title, volume = "what is seen of it from a centre, by rays", f"{hull.volume:.4g} m^3"
-        layers.append(Layer("hull", title, "–", volume, *hull_solid(hull)))
+        layers.append(hull_layer(load_hull(folder)))
     if "certified" in summary:
-        layers += _box_layers(folder, bool(summary["certified"]["finished"]))
+        layers += box_layers(load_boxes(folder, bool(summary["certified"]["finished"])))
     least = {name: np.asarray(np.min(each, axis=0), float) for name, each in values.items()}
     return Regions(folder, str(summary["robot"]), result.grid.axes, layers, least, units)
-
-
-def _words(volume: WorkspaceVolume) -> tuple[str, str]:
-    return f"{100.0 * volume.share:.2f} %", f"{volume.value:.4g} {volume.unit}"
-
-
-def _box_layers(folder: Path, finished: bool) -> list[Layer]:
-    """Boxes by what is proven of them."""
-    boxes = load_boxes(folder, finished)
-    sizes = np.ptp(np.concatenate([boxes.poses - boxes.halves, boxes.poses + boxes.halves]), axis=0)
-    layers = []
-    for name, count, *drawn in box_solids(boxes):
-        title = f"{'nothing is proven' if name == 'open' else f'proven {name}'}, {count}"
-        share = float(getattr(boxes, name))
-        volume = f"{share * np.prod(sizes[:3]):.4g} m^3"
-        if np.any(sizes[3:] > 0.0):  # of several orientations: they lie upon each other
-            volume = "–"
-        layers.append(Layer(f"boxes {name}", title, f"{100.0 * share:.2f} %", volume, *drawn))
-    return layers
 
 
 def show_regions(meshcat: Meshcat, regions: Regions | None, visible: set[str]) -> None:
@@ -159,9 +110,9 @@ def show_regions(meshcat: Meshcat, regions: Regions | None, visible: set[str]) -
     """
     meshcat.Delete(REGIONS)
     for layer in () if regions is None else regions.layers:
-        if len(layer.solid[1]):
+        if len(layer.mesh[1]):
             path = f"{REGIONS}/{layer.name}"
-            add_solid(meshcat, path, *layer.solid, layer.color, visible=layer.name in visible)
+            add_solid(meshcat, path, *layer.mesh, layer.color, visible=layer.name in visible)
 
 
 def draw_plane(meshcat: Meshcat, regions: Regions, plane: Plane | None) -> None:
@@ -308,7 +259,7 @@ def _place_layers(regions: Regions, shown: Workspaces) -> None:
                     with ui.element("td"):
                         box = ui.switch(value=name in shown.visible)
                         box.props(f'dense aria-label="show {escape(name)}"').mark(f"layer-{name}")
-                        box.set_enabled(len(layer.solid[1]) > 0)
+                        box.set_enabled(len(layer.mesh[1]) > 0)
                         box.on_value_change(
                             lambda event, name=name: shown.show_layer(name, bool(event.value))
                         )

@@ -1,15 +1,18 @@
 """Jobs and what they left, without a page: small programs stand for `cdpr`."""
 
 import asyncio
+import errno
 import os
 import select
 import signal
 import sys
+import tempfile
 
 import pytest
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.jobs import Job, JobManager, progress_of
+from cdpr_drake.studio.runs import RunJob
 from tests.studio.pages import LONGEST, until
 
 
@@ -69,6 +72,22 @@ async def test_how_a_job_ends_is_one_line(tmp_path, code, state, words):
     if code.startswith(SAYS):
         assert (job.result(), job.lines) == ({"answer": 42}, ["at last"])
         assert job.progress == ((1.0, "") if state == "finished" else (0.45, "Grid: 9 of 20"))
+
+
+async def test_a_job_that_a_full_disk_keeps_from_starting_has_failed(tmp_path, monkeypatch):
+    def full(*arguments, **options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    files = len(os.listdir("/proc/self/fd"))
+    for job in (toy("", tmp_path), RunJob("", tmp_path, tmp_path)):
+        job.begin()
+        assert await job.wait(LONGEST)
+        assert (job.state, job.message) == (
+            "failed", "cannot be started: [Errno 28] No space left on device",
+        )  # fmt: skip
+    del job
+    await until(lambda: len(os.listdir("/proc/self/fd")) == files)
 
 
 async def test_so_many_at_once_and_the_rest_in_order(tmp_path):

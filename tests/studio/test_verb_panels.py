@@ -136,7 +136,7 @@ def test_a_hull_and_proven_boxes_are_layers_too(tmp_path, meshcat):
     for name in ("inside", "open"):
         layer = layers[f"boxes {name}"]
         assert layer.share == f"{100.0 * told['certified'][f'{name}_share']:.2f} %"
-        corners = layer.solid[0].reshape(-1, 8, 3)
+        corners = layer.mesh[0].reshape(-1, 8, 3)
         assert layer.volume == f"{np.prod(np.ptp(corners, axis=1), axis=1).sum():.4g} m^3"
     show_regions(meshcat, regions, {"boxes open"})
     assert meshcat.HasPath("workspaces/hull")
@@ -152,7 +152,8 @@ def test_workspaces_of_stability_are_layers_and_their_margin_a_plane(tmp_path, m
     )
     (volumes,) = told["workspaces"]
     assert [(layer.name, layer.volume) for layer in regions.layers] == [
-        (f"baseline {name}", f"{volumes[name]['corners_m3']:.4g} m^3") for name in ("SZ", "Z", "S")
+        (name, f"{volumes[name.removeprefix('baseline/')]['corners_m3']:.4g} m^3")
+        for name in ("baseline/SZ", "baseline/Z", "S")
     ]
     ((name, values),) = regions.values.items()
     assert values.shape == (3, 3, 3)
