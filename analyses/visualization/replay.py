@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -151,18 +152,26 @@ class RobotPicture(RecordedScene):
         super().__init__(
             meshcat or open_meshcat(), builder, self._block.GetOutputPort("query_object")
         )
-        self.publish()
-        for path in transparent_paths(self._block.scene_graph.model_inspector()):
-            see_through(self.meshcat, path)
         if cables is None and scenario is not None:
             cables = scenario.cables
-        self.cables = CablePictures(self.meshcat, robot, full_scale, settings=cables, colors=colors)
+        self._new_cables = partial(
+            CablePictures, self.meshcat, robot, full_scale, settings=cables, colors=colors
+        )
+        self.show()
         self._robot, self._full_scale, self._known = robot, full_scale, True
         self._lines: list[tuple[str, Look]] = []
         frame = robot.frame
         self._depth = FRUSTUM * float(np.linalg.norm(frame.upper - frame.lower))
         if look:
             look_at(self.meshcat, frame.lower, frame.upper)
+
+    def show(self) -> None:
+        """Puts it into Meshcat, at the first time or where somebody took it out."""
+        self._visualizer.Delete()
+        self.publish()
+        for path in transparent_paths(self._block.scene_graph.model_inspector()):
+            see_through(self.meshcat, path)
+        self.cables = self._new_cables()
 
     def draw(
         self, X_WP: RigidTransform, tensions: Array, time: float | None = None,

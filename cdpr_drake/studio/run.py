@@ -28,7 +28,7 @@ from cdpr_drake.studio.runs import (
     RunBoard,
     RunJob,
     Sample,
-    finished_run,
+    identity,
 )
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
@@ -84,23 +84,14 @@ def run_panel(bench: Workbench) -> None:
 
 
 class RunPanel:
-    """The panel in one tab of a browser.
-
-    Attributes:
-        entry: The run that is shown; None: none is.
-        run: What is shown of it: samples while it goes on, rows of its log when it is finished.
-        other: The run behind it; None: there is none.
-    """
+    """The panel in one tab of a browser."""
 
     def __init__(self, bench: Workbench) -> None:
         """Places it into the current slot."""
         self._bench, self._board = bench, bench.kept(RunBoard)
         self._form: ScenarioForm | None = None
-        self.entry: Entry | None = None
-        self.run: RunJob | FinishedRun = NO_RUN
-        self.other: FinishedRun | None = None
-        self._unreadable: set[Path] = set()  # folders
         # What the browser has.
+        self._shown: object = None
         self._begun: tuple[object, tuple[Chart, ...], object] = NO_RUN, (), None
         self._sample: Sample | None = None
         self._jpeg = b""
@@ -118,25 +109,6 @@ class RunPanel:
         bench.robot.changed.subscribe(self._take_robot)
         ui.timer(TICK, self._tick)
         ui.timer(SLOW_TICK, self._slow_tick)
-
-    @property
-    def job(self) -> RunJob:
-        """The job of the run, as long as the server has it."""
-        job = self.entry and self.entry.job
-        return job if isinstance(job, RunJob) else NO_RUN
-
-    @property
-    def state(self) -> str:
-        """How the run is, in a few words; empty: none is shown."""
-        job = self.job
-        if job is not NO_RUN:
-            starts = job.state == JobState.RUNNING and not job.header
-            return "starting" if starts else job.state.value
-        if isinstance(self.run, FinishedRun):
-            return "finished"
-        if self.entry is None:
-            return ""
-        return "unreadable" if self.entry.folder in self._unreadable else READING
 
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
@@ -163,7 +135,7 @@ class RunPanel:
             self._run.props("dense outlined").classes("col").mark("run")
             speed = ui.select([*SPEEDS], label="speed").bind_value(board, "speed")
             speed.props("dense outlined").classes("cdpr-speed").mark("speed")
-            speed.on_value_change(lambda: self.job.tell("speed", factor=SPEEDS[board.speed]))
+            speed.on_value_change(lambda: board.job.tell("speed", factor=SPEEDS[board.speed]))
             for words, (icon, act, takes) in STEERING.items():
                 props = f'dense aria-label="{words}" title="{words}"'
                 button = self._button("", icon, props, act, takes)
@@ -176,13 +148,15 @@ class RunPanel:
         takes: Callable[[RunJob], bool],
     ) -> ui.button:  # fmt: skip
         """A button that does something to a run that works, as long as that takes it."""
-        button = ui.button(words, icon=icon, on_click=lambda: act(self.job)).props(props)
+        board = self._board
+        button = ui.button(words, icon=icon, on_click=lambda: act(board.job)).props(props)
         return button.bind_enabled_from(
-            self, "job", lambda job: job.state in WORKING and takes(job)
+            board, "job", lambda job: job.state in WORKING and takes(job)
         )
 
     def _place_hands(self) -> None:
         """Places buttons that break a cable or push the platform, and what was done so."""
+        board = self._board
 
         def break_cable(job: RunJob) -> None:
             job.tell(BREAK, cable=self._cable.value)
@@ -210,11 +184,12 @@ class RunPanel:
             field.props("dense outlined")
         for number in (force, time):
             number.classes("w-24")
-        done.bind_text_from(self, "job", _done_by_hand)
-        box.bind_visibility_from(self, "job", lambda job: bool(job.takes))
+        done.bind_text_from(board, "job", _done_by_hand)
+        box.bind_visibility_from(board, "job", lambda job: bool(job.takes))
 
     def _place_state(self) -> None:
         """Places the camera's image, and how the run is."""
+        board = self._board
         with ui.element("div").classes("cdpr-run-view"):
             with ui.element("figure").classes("cdpr-camera") as figure:
                 self._image = ui.element("img").props('alt="Image of the camera"').mark("camera")
@@ -228,28 +203,30 @@ class RunPanel:
                 key.classes("cdpr-soft")
         for element in (figure, key):
             element.bind_visibility_from(self, "_jpeg", bool)
-        state.bind_text_from(self, "state")
-        outcome.bind_text_from(self, "run", lambda shown: shown.outcome.replace("_", " "))
-        self._bar.bind_value_from(self, "job", lambda job: job.progress[0] or 0.0)
+        state.bind_text_from(board, "state")
+        outcome.bind_text_from(board, "run", lambda shown: shown.outcome.replace("_", " "))
+        self._bar.bind_value_from(board, "job", lambda job: job.progress[0] or 0.0)
         self._bar.bind_visibility_from(
-            self, "state", lambda state: state == READING or not self.job.state.is_over
+            board, "state", lambda state: state == READING or not board.job.state.is_over
         )
-        words.bind_text_from(self, "job", lambda job: job.message or job.progress[1])
+        words.bind_text_from(board, "job", lambda job: job.message or job.progress[1])
         problem.bind_text_from(words, "text")
-        words.bind_visibility_from(self, "state", lambda state: state != JobState.FAILED)
-        problem.bind_visibility_from(self, "state", lambda state: state == JobState.FAILED)
+        words.bind_visibility_from(board, "state", lambda state: state != JobState.FAILED)
+        problem.bind_visibility_from(board, "state", lambda state: state == JobState.FAILED)
 
     def _place_plots(self) -> None:
         """Places plots over time, and a slider for the time of a finished run."""
+        board = self._board
         self._plots = MovingPlots(self._begin)
         with ui.row().classes("w-full items-center no-wrap") as scrub:
             self._time = ui.label("0.00 s").classes("cdpr-time")
             self._slider = ui.slider(min=0.0, max=1.0, step=0.001).classes("col").mark("cursor")
-            self._slider.props('aria-label="Time"').bind_value(self._board, "cursor")
-        scrub.bind_visibility_from(self, "run", lambda shown: isinstance(shown, FinishedRun))
+            self._slider.props('aria-label="Time"').bind_value(board, "cursor")
+        scrub.bind_visibility_from(board, "run", lambda shown: isinstance(shown, FinishedRun))
 
     def _place_results(self) -> None:
         """Places the numbers of both runs, what is in the folder, and what is done with it."""
+        board = self._board
         with ui.expansion("Both runs in numbers").classes("w-full studio-group") as self._both:
             self._pairs = ui.html("", sanitize=False).classes("w-full").mark("run-pairs")
         self._fold = ui.expansion("Results, figures and files", on_value_change=self._fill_results)
@@ -271,11 +248,11 @@ class RunPanel:
 
         def show(element: ui.element, where: Callable[[Entry], bool]) -> None:
             element.bind_visibility_from(
-                self, "entry", lambda entry: entry is not None and where(entry)
+                board, "entry", lambda entry: entry is not None and where(entry)
             )
 
-        show(self._fold, lambda entry: bool(entry.files) and self.job.state.is_over)
-        show(recover, lambda entry: self.job.state == JobState.FAILED and PARTS in entry.files)
+        show(self._fold, lambda entry: bool(entry.files) and board.job.state.is_over)
+        show(recover, lambda entry: board.job.state == JobState.FAILED and PARTS in entry.files)
         show(download, lambda entry: bool(entry.files))
 
     async def _offer_scenarios(self) -> None:
@@ -354,28 +331,30 @@ class RunPanel:
 
     def _recover(self) -> None:
         """Writes results of a run that was killed, as far as it was simulated."""
-        words = ["finish", str(self.job.folder), "--json"]
-        self._bench.jobs.submit(Job(words, self.job.working))
+        job = self._board.job
+        self._bench.jobs.submit(Job(["finish", str(job.folder), "--json"], job.working))
 
     async def _download(self) -> None:
-        if self.entry is not None:
-            await send_file(self.entry.folder)
+        entry = self._board.entry
+        if entry is not None:
+            await send_file(entry.folder)
 
     async def _fill_results(self) -> None:
-        if self._fold.value and self.entry is not None and not self._results.default_slot.children:
+        entry = self._board.entry
+        if self._fold.value and entry is not None and not self._results.default_slot.children:
             with self._results:
-                await show_results(self.entry.folder)
+                await show_results(entry.folder)
 
     def _tick(self) -> None:
         """Shows what is new; many times a second."""
-        shown, board, is_live = self.run, self._board, isinstance(self.run, RunJob)
-        if self._begun != (shown, shown.charts, self.other):
+        board, shown, newest = self._board, self._board.run, self._plots.newest
+        is_live = isinstance(shown, RunJob)
+        if self._begun != (shown, shown.charts, board.other):
             self._begin()
         elif self._plots.is_ready or not is_live:
-            newest = self._plots.newest
-            new = [plot_row(sample) for sample in shown.samples if sample["t"] > newest]
-            if new:
-                self._plots.put(new)
+            if shown.samples and shown.samples[-1]["t"] > newest:
+                new = (sample for sample in shown.samples if sample["t"] > newest)
+                self._plots.put(list(map(plot_row, new)))
             self._look()
         if self._bench.panel not in ("", "run"):
             board.give_back()
@@ -385,8 +364,10 @@ class RunPanel:
 
     def _begin(self) -> None:
         """Shows all that is there, as after a change, or in a browser that shows it anew."""
-        shown, other = self.run, self.other
+        shown, other = self._board.run, self._board.other
         self._begun, self._sample = (shown, shown.charts, other), None
+        if isinstance(shown, FinishedRun):
+            self._slider.props(f"max={shown.end} step={max(shown.end / 2000.0, 1e-3)}")
         self._plots.begin(shown.charts, shown.end, [plot_row(sample) for sample in shown.samples])
         rows = [] if other is None else [plot_row(sample) for sample in other.samples]
         self._plots.run_method("compare", rows, "" if other is None else other.folder.name)
@@ -399,61 +380,40 @@ class RunPanel:
 
     def _look(self) -> None:
         """Camera and plots show the time of the slider, or the newest that a run has shown."""
-        sample, jpeg = self.run.at(self._board.cursor)
+        shown = self._board.run
+        sample, jpeg = shown.at(self._board.cursor)
         if jpeg is not self._jpeg:
             self._jpeg = jpeg
             self._image.props["src"] = f"data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"
-        if sample is not None and sample is not self._sample and isinstance(self.run, FinishedRun):
+        if sample is not None and sample is not self._sample and isinstance(shown, FinishedRun):
             self._time.text = f"{sample['t']:.2f} s"
             self._plots.run_method("cursor", sample["t"])
         self._sample = sample
 
     async def _slow_tick(self) -> None:
-        other = self._refresh()
-        if other is None or self.other is None or other.folder != self.other.folder:
-            self.other = await self._read(other)
-        entry, board = self.entry, self._board
-        if self.job.state.is_over and not isinstance(self.run, FinishedRun):
-            done = await self._read(entry)
-            if done is not None and _identity(entry) == _identity(self.entry):
-                self.run = done
-                board.cursor = done.end if board.cursor is None else min(board.cursor, done.end)
-                self._slider.props(f"max={done.end} step={max(done.end / 2000.0, 1e-3)}")
-        self._bench.results.show(RUN, self.run.subject)
-        self._bench.results.show(COMPARED, self.other.subject if self.other else None)
-
-    async def _read(self, entry: Entry | None) -> FinishedRun | None:
-        """What a run left; None: nothing, or what cannot be read, which is said once."""
-        if entry is None or not entry.is_whole or entry.folder in self._unreadable:
-            return None
-        try:
-            return await run.io_bound(finished_run, entry.folder, entry.changed)
-        except Exception:
-            self._unreadable.add(entry.folder)
-            raise
+        board, results = self._board, self._bench.results
+        await board.read(self._refresh())
+        results.show(RUN, board.run.subject)
+        results.show(COMPARED, board.other.subject if board.other else None)
 
     def _refresh(self) -> Entry | None:
         """Offers what runs there are, and shows the one looked at; returns the one behind it."""
-        board, choices = self._board, self._board.choices()
-        if board.shown not in choices:
-            board.shown = next((key for key, entry in choices.items() if entry.job), "")
-        if board.compared == board.shown:
-            board.compared = ""
+        board = self._board
+        choices = board.follow()
         _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
         whole = [key for key, entry in choices.items() if entry.is_whole and key != board.shown]
         others = {"": "none"} | {key: key for key in whole}
         _offer(self._compare, others, board.compared if board.compared in others else "")
-        before, self.entry = self.entry, choices.get(board.shown)
-        if _identity(before) != _identity(self.entry):
-            self.run, self._fold.value = self.job, False
-            self._unreadable.clear()
+        if self._shown != identity(board.entry):
+            self._shown, self._fold.value = identity(board.entry), False
             self._results.clear()
-        broken = {event.get("cable") for event in self.job.events}
-        names = enumerate(self.job.header.get("cables", ()))
+        job = board.job
+        broken = {event.get("cable") for event in job.events}
+        names = enumerate(job.header.get("cables", ()))
         left = {k: name for k, name in names if k not in broken}
         value = self._cable.value if self._cable.value in left else next(iter(left), None)
         _offer(self._cable, left, value)
-        is_endless = self.job.progress[0] is None
+        is_endless = job.progress[0] is None
         if is_endless != self._bar.props.get("indeterminate", False):
             self._bar.props.set_bool("indeterminate", is_endless)
         return choices.get(board.compared)
@@ -469,11 +429,6 @@ def run_pairs(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[Pair]:
         }
 
     return pairs(side(one), side(other))
-
-
-def _identity(entry: Entry | None) -> tuple[Path, Job | None] | None:
-    """What tells runs apart: one may come after another in a folder."""
-    return None if entry is None else (entry.folder, entry.job)
 
 
 def _done_by_hand(job: RunJob) -> str:

@@ -14,7 +14,6 @@ import zlib
 from asyncio import Future
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from functools import lru_cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
@@ -22,6 +21,8 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
+from nicegui import run
+from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.reporting.log_files import finite
 from cdpr_drake.analyses.runs.samples import MarksPicture, shown_limits
@@ -31,9 +32,10 @@ from cdpr_drake.cables.models import ELASTIC
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.geometry.poses import pose_from_row, pose_rows_distance
 from cdpr_drake.models.robot_loader import load_robot
+from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.boards import Board
+from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.plots import Chart, charts_of
 from cdpr_drake.studio.results import Subject, subject_of
@@ -59,6 +61,8 @@ MOST_SAMPLES = 3000
 """Samples of a run that are kept, or rows of a log, evenly spread."""
 
 LOG, SUMMARY, SCENARIO = "log.npz", "summary.json", "scenario.yaml"
+
+READING = "reading the log"
 
 PATHS = ("visualizer", "cables", "studio", WORKSPACE)
 """What is taken out of a scene before a run's robot is put there."""
@@ -260,25 +264,22 @@ class FinishedRun:
         return self.samples[row], self._drawn[1]
 
 
-def _picture(scene: RobotScene, scenario: Any) -> RobotPicture:
+def identity(entry: Entry | None) -> tuple[Path, Job | None] | None:
+    """What tells runs apart: one may come after another in a folder."""
+    return None if entry is None else (entry.folder, entry.job)
+
+
+def _picture(meshcat: Meshcat, robot: Robot, scenario: Any) -> RobotPicture:
     """The robot of a scenario and all that is round it."""
-    robot = load_robot(scenario.robot)
     servo, cables, world = scenario, None, None
     if not isinstance(scenario, Scenario):
         servo, world = None, scenario.world
         cables = CableSettings(model=ELASTIC, pulleys=scenario.cables.pulleys)
-    picture = RobotPicture(
-        robot, robot.tension_limits()[1], servo, cables, meshcat=scene.meshcat, world=world,
-        colors=[nth_look(k).color for k in range(len(robot.cables))],
-    )  # fmt: skip
-    look_at_robot(scene.meshcat, robot)
-    return picture
-
-
-@lru_cache(maxsize=4)
-def finished_run(folder: Path, written: float) -> FinishedRun:
-    """What a run left in a folder at a time; one for all tabs, since each is drawn as another."""
-    return FinishedRun(folder)
+    colors = [nth_look(k).color for k in range(len(robot.cables))]
+    full_scale = robot.tension_limits()[1]
+    return RobotPicture(
+        robot, full_scale, servo, cables, meshcat=meshcat, world=world, colors=colors
+    )
 
 
 class RunBoard(Board):
@@ -286,6 +287,9 @@ class RunBoard(Board):
 
     Attributes:
         draft: The scenario that is worked on; None: none was chosen.
+        entry: What is looked at; None: nothing.
+        run: What is shown of it: samples while it goes on, rows of its log when it is finished.
+        other: The run behind it; None: there is none.
         compared: Key of the run behind the one that is shown; empty: none.
         speed: Speed of the next run, a name of `SPEEDS`.
         cursor: Time that is looked at in a finished run [s]; None: its end.
@@ -297,17 +301,81 @@ class RunBoard(Board):
         super().__init__(bench.jobs, bench.folder.root, RUNS)
         self._bench = bench
         self.draft: ScenarioDraft | None = None
+        self.entry: Entry | None = None
+        self.run: RunJob | FinishedRun = NO_RUN
+        self.other: FinishedRun | None = None
         self.compared, self.speed = "", "real time"
         self.cursor: float | None = None
         self.in_scene: Sample | None = None
+        self._reads, self._unreadable = False, set[Path]()  # folders
         self._draws, self._drawn = False, 0.0
-        # Of the calculator's thread: the robot of a scenario.
+        # Of the calculator's thread: the robot of a scenario, and if the scene shows it.
         self._scenario: Any = None
+        self._is_drawn = False
         self._picture: RobotPicture
 
     def is_whole(self, folder: Path) -> bool:
         """True if a folder has the results of a run."""
         return all((folder / name).is_file() for name in (LOG, SUMMARY, SCENARIO))
+
+    @property
+    def job(self) -> RunJob:
+        """The job of the run that is looked at, as long as the server has it."""
+        job = self.entry and self.entry.job
+        return job if isinstance(job, RunJob) else NO_RUN
+
+    @property
+    def state(self) -> str:
+        """How the run is, in a few words; empty: none is looked at."""
+        job = self.job
+        if job is not NO_RUN:
+            starts = job.state == JobState.RUNNING and not job.header
+            return "starting" if starts else job.state.value
+        if isinstance(self.run, FinishedRun):
+            return "finished"
+        if self.entry is None:
+            return ""
+        return "unreadable" if self.entry.folder in self._unreadable else READING
+
+    def follow(self) -> dict[str, Entry]:
+        """What runs there are; the one that was begun last is looked at where none is chosen."""
+        choices = self.choices()
+        if self.shown not in choices:
+            self.shown = next((key for key, entry in choices.items() if entry.job), "")
+        if self.compared == self.shown:
+            self.compared = ""
+        before, self.entry = self.entry, choices.get(self.shown)
+        if identity(before) != identity(self.entry):
+            self.run = self.job
+            self._unreadable.clear()
+        return choices
+
+    async def read(self, other: Entry | None) -> None:
+        """Reads what a run left once it is over, and the run behind it; for all tabs, once."""
+        if self._reads:
+            return
+        self._reads = True
+        try:
+            if other is None or self.other is None or other.folder != self.other.folder:
+                self.other = await self._read(other)
+            entry = self.entry
+            if self.job.state.is_over and not isinstance(self.run, FinishedRun):
+                done = await self._read(entry)
+                if done is not None and identity(entry) == identity(self.entry):
+                    self.run = done
+                    self.cursor = done.end if self.cursor is None else min(self.cursor, done.end)
+        finally:
+            self._reads = False
+
+    async def _read(self, entry: Entry | None) -> FinishedRun | None:
+        """What a run left; None: nothing, or what cannot be read, which is said once."""
+        if entry is None or not entry.is_whole or entry.folder in self._unreadable:
+            return None
+        try:
+            return await run.io_bound(FinishedRun, entry.folder)
+        except Exception:
+            self._unreadable.add(entry.folder)
+            raise
 
     async def simulate(self, *, paused: bool = False, by_hand: bool = False) -> None:
         """Begins a run of the draft, perhaps standing at the start, and looks at it.
@@ -335,7 +403,7 @@ class RunBoard(Board):
         job.scenario, job.subject = scenario, subject_of(load_robot(scenario.robot))
         return job
 
-    def draw(self, run: RunJob | FinishedRun, sample: Sample, wait: float) -> None:
+    def draw(self, shown: RunJob | FinishedRun, sample: Sample, wait: float) -> None:
         """Draws a sample of a run, unless it is there, or one was drawn less than `wait` before [s]
         or is being drawn; to be called again and again."""
         if sample is self.in_scene or self._draws or monotonic() - self._drawn < wait:
@@ -346,9 +414,9 @@ class RunBoard(Board):
         def done(future: Future[None]) -> None:
             self._draws, self._drawn = False, monotonic()
             if future.exception() is None and self.in_scene is not None:
-                bench.draws(run.subject)
+                bench.draws(shown.subject)
 
-        bench.draw(lambda scene: self._draw(scene, run.scenario, sample, dark), done)
+        bench.draw(lambda scene: self._draw(scene, shown.scenario, sample, dark), done)
 
     def give_back(self) -> None:
         """Lets the open robot be shown again."""
@@ -359,15 +427,21 @@ class RunBoard(Board):
             self._bench.ask()
 
     def _leave(self, scene: RobotScene) -> None:
-        self._scenario = None
+        self._is_drawn = False
         scene.redraw()
 
     def _draw(self, scene: RobotScene, scenario: Any, sample: Sample, dark: bool) -> None:
-        if scenario is not self._scenario:
+        if scenario is not self._scenario or not self._is_drawn:
             for path in PATHS:
                 scene.meshcat.Delete(path)
-            self._scenario, self._picture = scenario, _picture(scene, scenario)
+            robot = load_robot(scenario.robot)
+            if scenario is not self._scenario:  # pydrake frees no diagram
+                self._scenario, self._picture = scenario, _picture(scene.meshcat, robot, scenario)
+            else:
+                self._picture.show()
+            look_at_robot(scene.meshcat, robot)
             scene.set_dark(dark)
+            self._is_drawn = True
         unstrained = sample["unstrained"]
         self._picture.draw(
             pose_from_row(np.array(sample["pose"], float)),

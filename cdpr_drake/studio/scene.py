@@ -83,12 +83,7 @@ class RobotScene:
         before, solids = self._robot, _solids(robot)
         colors = [nth_look(k).color for k in range(len(robot.cables))]
         full_scale, size, meshcat = robot.tension_limits()[1], _size(robot), self.meshcat
-        if before is not None and solids == self._solids:
-            # A diagram takes memory that Drake is slow to give back, and the same solids need none.
-            if not self._picture.cables.move_to(robot, full_scale):
-                meshcat.Delete("cables")
-                self._picture.cables = CablePictures(meshcat, robot, full_scale, colors=colors)
-        else:
+        if before is None or solids != self._solids:
             # Who looks at a point that moves keeps the view.
             look = (
                 before is None or robot.name != before.name
@@ -96,9 +91,12 @@ class RobotScene:
             )  # fmt: skip
             for path in ("cables", "visualizer", "studio"):
                 meshcat.Delete(path)
-            self._picture = RobotPicture(
-                robot, full_scale, meshcat=meshcat, colors=colors, look=look
-            )
+            if solids == self._solids:  # pydrake frees no diagram, and the same solids need none
+                self._picture.show()
+            else:
+                self._picture = RobotPicture(
+                    robot, full_scale, meshcat=meshcat, colors=colors, look=look
+                )
             if look:
                 look_at_robot(meshcat, robot)
             self.set_dark(self._dark)
@@ -108,6 +106,9 @@ class RobotScene:
                     meshcat.SetObject(f"{path}/{k}", shape, Rgba(*rgb(color)))
             p_WP = np.tile(robot.home.position, (3, 1))
             add_solid(meshcat, SHADER, p_WP, np.array([[0, 1, 2]]), WORKSPACE_COLOR)
+        if not self._picture.cables.move_to(robot, full_scale):
+            meshcat.Delete("cables")
+            self._picture.cables = CablePictures(meshcat, robot, full_scale, colors=colors)
         for k, p_WA in enumerate(robot.cable_set().p_WA.T):
             meshcat.SetTransform(f"{EXITS}/{k}", RigidTransform(p_WA))
         self._robot, self._solids = robot, solids

@@ -34,8 +34,9 @@ if TYPE_CHECKING:  # a workspace is drawn by `add_pictured_robot`, and has no se
 
 
 def scene_adder(
-    settings: VisualServoSettings | None, world: WorldInScene | None = None
-) -> SceneAdder:
+    settings: VisualServoSettings | None, world: WorldInScene | None = None, *,
+    drawn: bool = False,
+) -> SceneAdder:  # fmt: skip
     """Puts a servo's target into a robot's block, which gets a port X_WO if it is in the world.
 
     For use as `add_to_scene` of `CableRobot`.
@@ -43,13 +44,14 @@ def scene_adder(
     Args:
         settings: The servo; None: there is no target.
         world: What else is round the robot.
+        drawn: True if nobody needs X_WO of a target that stands.
     """
 
     def add(
         builder: DiagramBuilder, robot: RobotInPlant, scene_graph: SceneGraph
     ) -> Callable[[], None] | None:
         if settings is not None:
-            _add_target(settings, builder, robot, scene_graph)
+            _add_target(settings, builder, robot, scene_graph, drawn)
         return None if world is None else world.add(builder, robot, scene_graph)
 
     return add
@@ -90,8 +92,9 @@ def add_pictured_robot(
     floor = section is None or section.ground is None
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, time_step=0.0)
     in_plant = fill_scene(
-        builder, robot, plant, scene_graph, add_to_scene=scene_adder(scenario, around), floor=floor
-    )
+        builder, robot, plant, scene_graph, floor=floor,
+        add_to_scene=scene_adder(scenario, around, drawn=True),
+    )  # fmt: skip
     ports = {
         "query_object": scene_graph.get_query_output_port(),
         "body_velocities": plant.get_body_spatial_velocities_output_port(),
@@ -104,14 +107,16 @@ def _add_target(
     builder: DiagramBuilder,
     robot: RobotInPlant,
     scene_graph: SceneGraph,
+    drawn: bool,
 ) -> None:
     """Puts target and known tag of a servo into a scene."""
     known, target = settings.estimator.known_tag, settings.target
     if known is not None:
         add_plates(robot.plant, known.target().plates(), known.pose.transform(), "known_tag")
-    if target.carrier == "platform":
-        start = target.path().at(0.0)
-        add_plates(robot.plant, target.target().plates(), start, "target", robot.body)
+    path, is_carried = target.path(), target.carrier == "platform"
+    if is_carried or (drawn and not path.is_moving()):
+        body = robot.body if is_carried else None
+        add_plates(robot.plant, target.target().plates(), path.at(0.0), "target", body)
         return
     builder.ExportOutput(add_target(builder, scene_graph, target), "X_WO")
 
