@@ -357,17 +357,17 @@ class RunBoard(Board):
         self._reads = True
         try:
             if other is None or self.other is None or other.folder != self.other.folder:
-                self.other = await self._read(other)
+                self.other = await self._finished(other)
             entry = self.entry
             if self.job.state.is_over and not isinstance(self.run, FinishedRun):
-                done = await self._read(entry)
+                done = await self._finished(entry)
                 if done is not None and identity(entry) == identity(self.entry):
                     self.run = done
                     self.cursor = done.end if self.cursor is None else min(self.cursor, done.end)
         finally:
             self._reads = False
 
-    async def _read(self, entry: Entry | None) -> FinishedRun | None:
+    async def _finished(self, entry: Entry | None) -> FinishedRun | None:
         """What a run left; None: nothing, or what cannot be read, which is said once."""
         if entry is None or not entry.is_whole or entry.folder in self._unreadable:
             return None
