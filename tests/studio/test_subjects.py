@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from cdpr_drake.analyses.visualization.replay import RecordedScene
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import write_asked
 from cdpr_drake.studio.panel import PANELS
@@ -103,7 +104,9 @@ async def test_workspaces_leave_the_scene_of_another_robot_and_come_back(user, b
     await until(lambda: words in field(user, "about-workspaces").text)
 
 
-async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, bench):
+async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, bench, monkeypatch):
+    build, built = RecordedScene.__init__, []
+    monkeypatch.setattr(RecordedScene, "__init__", lambda *of: (built.append(of), build(*of))[1])
     bench.take_opened(bench.files.open(OTHER))
     await show(user, bench, "run", "run")
     for time in (None, 0.1):
@@ -116,6 +119,8 @@ async def test_the_scene_has_a_run_and_its_robot_while_its_panel_is_shown(user, 
             field(user, "cursor").value = time  # as another tab moves it
         open_panel(user, "run")
     await until(lambda: bench.drawn is not None)
+    assert len(built) == 2  # the robot that is open, and that of the run: once each
+    assert all(in_scene(bench, path) for path in ("visualizer", "cables"))
 
 
 async def test_a_run_is_of_the_robot_that_is_open_and_of_no_other(user, bench, work):

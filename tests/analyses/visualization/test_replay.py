@@ -30,6 +30,8 @@ from cdpr_drake.geometry.poses import pose_from_angles, pose_row
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import TENSIONS
 from cdpr_drake.servoing.servo_task import CameraMounting
+from cdpr_drake.systems.diagrams.camera import add_pictured_robot
+from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.vision.pinhole import Pinhole
 from tests.models.representative_robots import REPRESENTATIVE_ROBOTS
 
@@ -156,6 +158,18 @@ def test_a_page_that_would_be_too_large_has_fewer_frames(tmp_path, monkeypatch):
     monkeypatch.setattr(replay, "BYTES_EACH", 1)  # as if the estimate were far too low
     write_replay(path, robot, log)
     assert empty < path.stat().st_size <= most
+
+
+@pytest.mark.parametrize(("name", "moves"), [("acrobot_pbvs", False), ("acrobot_moving_tag", True)])
+def test_a_picture_has_systems_of_drake_alone_unless_its_target_moves(name, moves):
+    """pydrake frees no diagram with a system that is written in Python."""
+    builder, scenario = DiagramBuilder(), load_scenario(name)
+    block = add_pictured_robot(builder, load_robot(scenario.robot), scenario)
+    modules = {type(system).__module__.partition(".")[0] for system in builder.GetSystems()}
+    assert ("cdpr_drake" in modules) == moves
+    inspector = block.scene_graph.model_inspector()
+    names = [inspector.GetName(each) for each in inspector.GetAllGeometryIds()]
+    assert any(name.startswith("target") for name in names)
 
 
 def test_three_hours_of_frames_fit_by_estimate(tmp_path):
