@@ -14,7 +14,7 @@ from typing import Any
 
 from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
 from cdpr_drake.studio.verb_form import Verb
 

@@ -1,6 +1,13 @@
-"""A text that is checked whenever it changes, with undo and redo."""
+"""A text that is checked whenever it changes, with undo and redo, and edits of a YAML text.
+
+An edit changes one value where it stands, and nothing else: comments and order stay. What comes out
+is read again and compared with what was meant; where it differs, as with anchors or odd layouts,
+the whole text is written anew instead.
+"""
 
 from __future__ import annotations
+
+
 
 import asyncio
 import re
@@ -9,6 +16,19 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from nicegui import Event
+
+
+import math
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import is_dataclass
+from typing import Any
+
+import yaml
+
+from cdpr_drake.schema.typed_yaml import Place
+from cdpr_drake.schema.yaml_files import YamlTextError, compose_yaml, load_yaml
 
 T = TypeVar("T")
 
@@ -113,3 +133,137 @@ class Document(Generic[T]):
             re.sub(file, lambda at: f"line {at[1]}: " if lines and at[1] else "", line)
             for line in str(problem).split("\n")
         ]
+
+
+def with_value(text: str, place: Place, value: Any, order: Sequence[str] = ()) -> str:
+    """The text with another value at a place; sections on the way that are not there are added.
+
+    Args:
+        text: YAML, a mapping at its top.
+        place: Where; a key that is not there yet is added.
+        value: Numbers, texts, switches, None, and lists and mappings of them.
+        order: Keys of the mapping in their usual order, for one that is added.
+    """
+    data, last = load_yaml(text), place[-1]
+    parent = value_in(data, place[:-1])
+    if parent is None:
+        return with_value(text, place[:-1], {last: value}, order)
+    if isinstance(parent, list) and last == len(parent):
+        parent.append(value)
+    else:
+        parent[last] = value
+    return _checked(_put(text, place, flow(value), order), data)
+
+
+def with_item(text: str, place: Place, value: Any) -> str:
+    """The text with one more item at the end of the list at a place, made if it is not there."""
+    items = value_in(load_yaml(text), place)
+    return with_value(text, (*place, len(items)) if items else place, value if items else [value])
+
+
+def without_item(text: str, place: Place) -> str:
+    """The text without the item of a list at a place."""
+    data, above, number = load_yaml(text), place[:-1], place[-1]
+    del value_in(data, above)[number]
+    items = _node(compose_yaml(text), above)
+    if not isinstance(items, yaml.SequenceNode) or items.flow_style or len(items.value) < 2:
+        return _checked(None, data)
+    node = items.value[int(number)]
+    start = text.rfind("\n", 0, node.start_mark.index)
+    return _checked(f"{text[:start]}{text[_line_end(text, node) :]}", data)
+
+
+def value_in(data: Any, place: Place) -> Any:
+    """What stands at a place in plain values or settings; None: nothing."""
+    for key in place:
+        try:
+            data = getattr(data, str(key)) if is_dataclass(data) else data[key]
+        except (AttributeError, KeyError, IndexError, TypeError):
+            return None
+    return data
+
+
+class _Flow(yaml.SafeDumper):
+    """PyYAML's, with quotes around words that are no names."""
+
+    def represent_str(self, words: str) -> yaml.ScalarNode:
+        style = None if re.fullmatch("[A-Za-z][A-Za-z0-9_-]*", words) else '"'
+        return self.represent_scalar("tag:yaml.org,2002:str", words, style=style)
+
+
+_Flow.add_representer(str, _Flow.represent_str)
+
+
+def flow(value: Any) -> str:
+    """A value in one line of YAML, numbers with all their digits."""
+    words: str = yaml.dump(
+        value, Dumper=_Flow, default_flow_style=True, sort_keys=False, allow_unicode=True,
+        width=math.inf,
+    )  # fmt: skip
+    return words.removesuffix("...\n").rstrip("\n")
+
+
+def _checked(new: str | None, meant: Any) -> str:
+    """The edited text if it means what is meant, else all of it written anew."""
+    with suppress(YamlTextError):
+        if new is not None and load_yaml(new) == meant:
+            return new
+    words: str = yaml.safe_dump(
+        meant, sort_keys=False, allow_unicode=True, default_flow_style=None, width=100
+    )
+    return words
+
+
+def _put(text: str, place: Place, words: str, order: Sequence[str]) -> str | None:
+    """The text with the words of a value at a place; None: they have no place of their own."""
+    root, last = compose_yaml(text), place[-1]
+    node, parent = _node(root, place), _node(root, place[:-1])
+    if node is not None:
+        start, end = node.start_mark.index, _end(node)
+        if isinstance(node, yaml.ScalarNode) and node.style in ("|", ">"):
+            words += "\n"
+        elif isinstance(node, yaml.CollectionNode) and not node.flow_style:
+            # What stood on lines of its own now stands behind its key.
+            start, words = len(text[:start].rstrip()), f" {words}"
+        return f"{text[:start]}{words}{text[end:]}"
+    if not isinstance(parent, yaml.CollectionNode):
+        return None
+    is_list = isinstance(parent, yaml.SequenceNode)
+    if not is_list:
+        words = f"{last}: {words}"
+    if parent.flow_style:
+        end = parent.end_mark.index - 1
+        return f"{text[:end].rstrip()}{', ' if parent.value else ''}{words}{text[end:]}"
+    margin = " " * parent.start_mark.column
+    later = order[order.index(str(last)) + 1 :] if last in order else ()
+    for name, _ in () if is_list else parent.value:
+        if name.value in later:
+            start = name.start_mark.index
+            return f"{text[:start]}{words}\n{margin}{text[start:]}"
+    end = _line_end(text, parent)
+    return f"{text[:end]}\n{margin}{'- ' if is_list else ''}{words}{text[end:]}"
+
+
+def _node(node: Any, place: Place) -> yaml.Node | None:
+    for key in place:
+        children: dict[Any, yaml.Node] = {}
+        if isinstance(node, yaml.SequenceNode):
+            children = dict(enumerate(node.value))
+        elif isinstance(node, yaml.MappingNode):
+            children = {name.value: child for name, child in node.value}
+        node = children.get(key)
+    return node
+
+
+def _end(node: yaml.Node) -> int:
+    """Where a node ends without the space and comments that YAML counts to it."""
+    while isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        node = last[1] if isinstance(last, tuple) else last
+    return int(node.end_mark.index)
+
+
+def _line_end(text: str, node: yaml.Node) -> int:
+    """The end of the line where a node ends, or that before, where it ends at a line's start."""
+    end = text.find("\n", _end(node) - 1)
+    return len(text) if end < 0 else end

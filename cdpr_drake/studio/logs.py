@@ -20,7 +20,7 @@ from cdpr_drake.analyses.logs.import_log import import_log
 from cdpr_drake.analyses.logs.replay import TABLE
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.palette import DASHED, Look, nth_look
-from cdpr_drake.studio.folder import MOST_FILES, WorkingFolder
+from cdpr_drake.studio.files import MOST_FILES, WorkingFolder
 from cdpr_drake.studio.panel import LOG, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, Row
 from cdpr_drake.studio.session import Workbench

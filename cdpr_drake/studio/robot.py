@@ -18,7 +18,7 @@ from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
 from cdpr_drake.studio.numbers import Pair, pair_table, robots_side_by_side
 from cdpr_drake.studio.panel import notify, show_errors
-from cdpr_drake.studio.robot_files import LARGEST_UPLOAD, MOST_UPLOADS, UPLOADS, OpenedRobot
+from cdpr_drake.studio.files import LARGEST_UPLOAD, MOST_UPLOADS, UPLOADS, OpenedRobot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.settings_form import SettingsForm, dialog, document_buttons, tool
 

@@ -21,7 +21,7 @@ from cdpr_drake.errors import CdprError, ScenarioError
 from cdpr_drake.hosts import is_loopback
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.door import BENCH, TOKEN, Door, Sessions
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.page import SCENE, make_page
 from cdpr_drake.studio.session import USUAL_ROBOT, Workbench

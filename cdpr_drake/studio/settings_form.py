@@ -21,7 +21,7 @@ from cdpr_drake.schema.typed_yaml import Place, plain_value
 from cdpr_drake.schema.yaml_files import load_yaml
 from cdpr_drake.studio.document import Document
 from cdpr_drake.studio.panel import message, notify, show_errors
-from cdpr_drake.studio.yaml_edit import flow, value_in, with_item, with_value, without_item
+from cdpr_drake.studio.document import flow, value_in, with_item, with_value, without_item
 
 Edit = Callable[[str], str]
 Action = Callable[[], Awaitable[object]]

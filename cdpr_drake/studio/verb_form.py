@@ -19,7 +19,7 @@ from cyclopts import Argument
 from nicegui import ui
 
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 
 PLACES = ("--out", "--overwrite")
 """Options that say where results go, which the studio does."""

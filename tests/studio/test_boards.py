@@ -9,7 +9,7 @@ import pytest
 from cdpr_drake.cli.studio import verbs
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import Board
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager
 from tests.studio.pages import LONGEST, until
 

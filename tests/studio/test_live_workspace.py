@@ -12,7 +12,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import live_workspace
 from cdpr_drake.studio import session as sessions
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.live_workspace import COARSE, FINE, sketch_grid, sketch_workspace
 from cdpr_drake.studio.scene import EXITS, SHADER, WORKSPACE, RobotScene
 from cdpr_drake.studio.session import POSE_NUMBERS, Workbench

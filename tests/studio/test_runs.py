@@ -15,7 +15,7 @@ from cdpr_drake.analyses.runs.steering import Message
 from cdpr_drake.errors import OutputFolderError
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio import runs
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.plots import plot_row
 from cdpr_drake.studio.run import run_pairs, run_panel

@@ -12,7 +12,7 @@ from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.workspace import Workspaces
-from cdpr_drake.studio.yaml_edit import with_value
+from cdpr_drake.studio.document import with_value
 from tests.studio.pages import field, in_scene, open_panel, problems, shown, until
 
 ROBOT, OTHER = "acrobot_small", "planar"

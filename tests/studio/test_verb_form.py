@@ -11,7 +11,7 @@ from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.cli.studio import NOT_OFFERED, verbs
 from cdpr_drake.errors import CdprError
-from cdpr_drake.studio.folder import WorkingFolder
+from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.verb_form import Verb, VerbForm
 from tests.studio.pages import field, simulated
 

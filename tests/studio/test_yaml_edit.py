@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from cdpr_drake.models.robot_loader import robot_names, robot_text
-from cdpr_drake.studio.yaml_edit import flow, with_item, with_value, without_item
+from cdpr_drake.studio.document import flow, with_item, with_value, without_item
 
 TEXT = """\
 # a robot
