@@ -7,25 +7,17 @@ the whole text is written anew instead.
 
 from __future__ import annotations
 
-
-
 import asyncio
-import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import Generic, TypeVar
-
-from nicegui import Event
-
-
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import is_dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Generic, TypeVar
 
 import yaml
+from nicegui import Event
 
 from cdpr_drake.schema.typed_yaml import Place
 from cdpr_drake.schema.yaml_files import YamlTextError, compose_yaml, load_yaml

@@ -7,24 +7,16 @@ those have to lie in the folder, or where the robot itself is.
 
 from __future__ import annotations
 
-
-
-from contextlib import suppress
-from itertools import islice
-from pathlib import Path
-from secrets import token_hex
-
-from cdpr_drake.errors import CdprError, OutputFolderError
-
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path, PurePath
+from secrets import token_hex
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
-from cdpr_drake.errors import CdprError, RobotFileError
+from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.formats.robot_exchange import import_robot
 from cdpr_drake.models.file_kinds import SUFFIXES as ROBOT_SUFFIXES
 from cdpr_drake.models.file_kinds import is_foreign

@@ -63,23 +63,21 @@ class Logs(Verbs):
         """The log."""
         return {"log": str(self.bench.folder.root / self.log) if self.log else ""}
 
-    async def show(self, view: View) -> None:
-        """Places a comparison as curves, then all else that there is of it."""
-        folder = view.folder
-        assert folder is not None
-        with show_errors():
-            comparison = await run.io_bound(read_comparison, folder)
-            if comparison is not None:  # the server is not ending
-                with ui.element("div").classes("w-full cdpr-run").mark("comparison"):
-                    plots = MovingPlots(lambda: plots.begin(*comparison))
-        view.place()
+    def read(self, folder: Path) -> Any:
+        """A comparison as curves."""
+        return read_comparison(folder)
+
+    def place(self, read: Any) -> None:
+        """Places the curves."""
+        with ui.element("div").classes("w-full cdpr-run").mark("comparison"):
+            plots = MovingPlots(lambda: plots.begin(*read))
 
 
 def logs_panel(bench: Workbench) -> None:
     """Places the logs panel."""
     logs = bench.kept(Logs)
     chosen = ui.select([], label="log in the working folder", with_input=True)
-    chosen.props("dense outlined").classes("w-full").mark("log")
+    chosen.classes("w-full").mark("log")
     contents = ui.element("div").classes("w-full").mark("log-contents")
     panel = VerbPanel(logs)
 

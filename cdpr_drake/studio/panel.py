@@ -149,4 +149,7 @@ def _is_mistake(record: logging.LogRecord) -> bool:
     return not isinstance(record.msg, CdprError | OSError)
 
 
+for field_kind in (ui.input, ui.number, ui.select):
+    field_kind.default_props("dense outlined")
+
 logging.getLogger("nicegui").addFilter(_is_mistake)  # refusals are for the page alone

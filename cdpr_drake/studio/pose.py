@@ -35,9 +35,9 @@ def pose_panel(bench: Workbench) -> None:
     sliders_follow = _place_sliders(bench)
     with ui.row().classes("studio-row items-end"):
         method = ui.select(_methods(bench), value=bench.method, label="Distribute tensions by")
-        method.classes("grow").props("dense options-dense outlined").mark("method")
+        method.classes("grow").props("options-dense").mark("method")
         reference = ui.number("Desired tension [N]", value=bench.reference, min=0.0)
-        reference.props("dense outlined clearable").classes("w-36").mark("reference")
+        reference.props("clearable").classes("w-36").mark("reference")
         home = ui.button("Home pose", icon="home").props("outline dense no-caps").mark("home")
         busy_sign(bench)
     waiting = ui.label(COMPILING).classes("studio-soft")
@@ -130,7 +130,7 @@ def _place_slider(bench: Workbench, k: int, axis: PoseAxis) -> ui.slider:
     slider.props(f'aria-label="{axis.words} [{axis.unit}]" snap=false').mark(f"slider-{k}")
     slider.on("update:model-value", lambda event: slider.set_value(event.args), throttle=THROTTLE)
     field = ui.input(value=_shown(value), validation=refusal).without_auto_validation()
-    field.props(f'dense outlined suffix="{axis.unit}" aria-label="{axis.words}" hide-bottom-space')
+    field.props(f'suffix="{axis.unit}" aria-label="{axis.words}" hide-bottom-space')
     field.classes("studio-number").mark(f"coordinate-{k}")
     field.on("keydown.enter", typed).on("blur", typed)
     return slider

@@ -16,9 +16,9 @@ from cdpr_drake.formats.robot_exchange import export_robot
 from cdpr_drake.formats.robot_exports import EXPORTS, export_omissions, omission_words
 from cdpr_drake.models.robot_loader import robot_names
 from cdpr_drake.studio.dragging import add_point_dragging, live_workspace_bar
+from cdpr_drake.studio.files import LARGEST_UPLOAD, MOST_UPLOADS, UPLOADS, OpenedRobot
 from cdpr_drake.studio.numbers import Pair, pair_table, robots_side_by_side
 from cdpr_drake.studio.panel import notify, show_errors
-from cdpr_drake.studio.files import LARGEST_UPLOAD, MOST_UPLOADS, UPLOADS, OpenedRobot
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.settings_form import SettingsForm, dialog, document_buttons, tool
 
@@ -96,7 +96,7 @@ async def open_dialog(bench: Workbench) -> None:
             ("open-file", f"File in {bench.folder.root}", files),
         ):
             chosen = ui.select(names, label=label, with_input=True, on_change=choose)
-            chosen.props("dense outlined").classes("w-full").mark(mark)
+            chosen.classes("w-full").mark(mark)
         too_large = (
             f"found a file that is too large, or too many; accepted: up to {MOST_UPLOADS} files of "
             f"at most {LARGEST_UPLOAD:,} bytes"
@@ -127,7 +127,7 @@ async def save_dialog(bench: Workbench) -> None:
 
     with dialog(f"Save in {bench.folder.root}", "Save", save) as attempt:
         name = ui.input("Name", value=bench.file or f"{bench.robot.value.name}.yaml")
-        name.props("dense outlined autofocus").classes("w-full").mark("save-name")
+        name.props("autofocus").classes("w-full").mark("save-name")
         name.on("keydown.enter", partial(attempt, save))
         replace = ui.checkbox("Replace a file of this name").mark("save-replace")
 
@@ -152,7 +152,7 @@ async def export_dialog(bench: Workbench) -> None:
         formats = {YAML: "cdpr_drake's robot file"} | EXPORTS
         options = {name: f"{name}: {words}" for name, words in formats.items()}
         select = ui.select(options, value=YAML, label="Format")
-        select.props("dense outlined").classes("w-full").mark("export-format")
+        select.classes("w-full").mark("export-format")
 
 
 def _zipped(files: dict[str, str]) -> bytes:
@@ -167,7 +167,7 @@ def place_beside(bench: Workbench) -> None:
     """Places a choice of another robot, which is shown beside the one that is open."""
     with ui.expansion("Beside another robot").classes("w-full studio-group") as fold:
         other = ui.select([NOTHING], value=NOTHING, label="other robot").mark("other-robot")
-        other.props("dense outlined").classes("w-full")
+        other.classes("w-full")
         table = ui.html("", sanitize=False).classes("w-full").mark("robot-pairs")
 
     async def unfold() -> None:

@@ -113,7 +113,7 @@ class RunPanel:
     def _place_start(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
             self._scenario = ui.select({}, label="scenario", with_input=True)
-            self._scenario.props("dense outlined").classes("col").mark("scenario")
+            self._scenario.classes("col").mark("scenario")
             self._scenario.on_value_change(self._choose_scenario)
             self._paused = ui.checkbox("start paused").mark("paused")
             self._by_hand = ui.checkbox("break and push by hand").mark("by-hand")
@@ -132,9 +132,9 @@ class RunPanel:
         board = self._board
         with ui.row().classes("w-full items-center no-wrap"):
             self._run = ui.select({}, label="run", on_change=self._choose_run)
-            self._run.props("dense outlined").classes("col").mark("run")
+            self._run.classes("col").mark("run")
             speed = ui.select([*SPEEDS], label="speed").bind_value(board, "speed")
-            speed.props("dense outlined").classes("cdpr-speed").mark("speed")
+            speed.classes("cdpr-speed").mark("speed")
             speed.on_value_change(lambda: board.job.tell("speed", factor=SPEEDS[board.speed]))
             for words, (icon, act, takes) in STEERING.items():
                 props = f'dense aria-label="{words}" title="{words}"'
@@ -180,8 +180,6 @@ class RunPanel:
                 hand(PUSH, "touch_app", "A push at Po, a half sine with this peak force", push)
             done = ui.label().classes("cdpr-soft").props('role="status"').mark("hand-done")
         direction.classes("w-32").mark("push-direction")
-        for field in (self._cable, direction, force, time):
-            field.props("dense outlined")
         for number in (force, time):
             number.classes("w-24")
         done.bind_text_from(board, "job", _done_by_hand)
@@ -235,8 +233,8 @@ class RunPanel:
         self._both.mark("both-runs")
         with ui.row().classes("w-full items-center"):
             self._compare = ui.select({}, label="compare with", on_change=self._choose_other)
-            self._compare.props("dense outlined").classes("cdpr-compare").mark("compare")
-            span = ui.select([*SPANS], value="all", label="time shown").props("dense outlined")
+            self._compare.classes("cdpr-compare").mark("compare")
+            span = ui.select([*SPANS], value="all", label="time shown")
             span.on_value_change(
                 lambda event: self._plots.run_method("show_span", SPANS[event.value])
             )

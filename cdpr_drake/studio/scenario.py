@@ -16,11 +16,10 @@ from cdpr_drake.schema.declarations import settings_of
 from cdpr_drake.schema.input_files import input_text
 from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.schema.yaml_files import YamlTextError, load_yaml
-from cdpr_drake.studio.document import Document
+from cdpr_drake.studio.document import Document, flow
 from cdpr_drake.studio.files import is_within
 from cdpr_drake.studio.panel import message
 from cdpr_drake.studio.settings_form import SettingsForm, document_buttons
-from cdpr_drake.studio.document import flow
 from cdpr_drake.systems.diagrams.load import load_scenario, parse_scenario
 from cdpr_drake.systems.scenarios.files import check_moves_robot, scenario_file
 

@@ -25,15 +25,13 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.models.file_kinds import is_foreign
 from cdpr_drake.models.robot_loader import robot_file, robot_names, robot_text
 from cdpr_drake.models.robot_schema import Robot
-from cdpr_drake.studio.document import Document
-from cdpr_drake.studio.files import WorkingFolder
+from cdpr_drake.studio.document import Document, with_value
+from cdpr_drake.studio.files import OpenedRobot, RobotFiles, WorkingFolder
 from cdpr_drake.studio.jobs import JobManager
 from cdpr_drake.studio.live_workspace import COARSE, LiveWorkspace, sketch_workspace
 from cdpr_drake.studio.pose_answer import USUAL_METHOD, PoseAnswer, RobotQuestions
 from cdpr_drake.studio.results import Results, Subject
-from cdpr_drake.studio.files import OpenedRobot, RobotFiles
 from cdpr_drake.studio.verb_form import Verb
-from cdpr_drake.studio.document import with_value
 
 if TYPE_CHECKING:  # it takes a second of the start
     from cdpr_drake.studio.scene import Draw, RobotScene

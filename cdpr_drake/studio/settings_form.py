@@ -19,9 +19,8 @@ from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.declarations import Setting, settings_of
 from cdpr_drake.schema.typed_yaml import Place, plain_value
 from cdpr_drake.schema.yaml_files import load_yaml
-from cdpr_drake.studio.document import Document
+from cdpr_drake.studio.document import Document, flow, value_in, with_item, with_value, without_item
 from cdpr_drake.studio.panel import message, notify, show_errors
-from cdpr_drake.studio.document import flow, value_in, with_item, with_value, without_item
 
 Edit = Callable[[str], str]
 Action = Callable[[], Awaitable[object]]
@@ -226,10 +225,10 @@ class SettingsForm:
             element: Any = ui.switch()
         elif _is_choice(rule):
             element = ui.select([*([""] if rule.nullable else []), *rule.choices])
-            element.props(f'dense outlined options-dense hide-bottom-space label="{words}"')
+            element.props(f'options-dense hide-bottom-space label="{words}"')
             element.classes("studio-named")  # the list's name for programs that read aloud
         else:
-            element = ui.input().props("dense outlined hide-bottom-space")
+            element = ui.input().props("hide-bottom-space")
             in_table = any(isinstance(key, int) for key in place[-2 - is_part : -1])
             if rule.unit not in ("", "-") and last not in (0, 1) and not in_table:
                 element.props["suffix"] = rule.unit
@@ -375,7 +374,7 @@ class SettingsForm:
                 if rule.kind == "sections":  # what an item must have, as YAML
                     keys = (f"{at[0]}: ..." for at, _ in _required(settings_of(rule.section)))
                     hint += ", such as [{" + ", ".join(dict.fromkeys(keys)) + "}]"
-                field.props("dense outlined").classes("w-full").props["hint"] = hint
+                field.classes("w-full").props["hint"] = hint
 
 
 def _with_copy(place: Place, text: str) -> str:

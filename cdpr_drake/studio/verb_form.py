@@ -245,7 +245,7 @@ class VerbForm:
             )  # fmt: skip
         if isinstance(made, ui.select):
             made.props(f'label="{option.key}"').classes("studio-named")
-        made.props(f'dense outlined hide-bottom-space options-dense aria-label="{option.key}"')
+        made.props(f'hide-bottom-space options-dense aria-label="{option.key}"')
         made.props["hint"] = f"{help}; several by semicolons" if option.many else help
         self._inputs[option.key] = made
         return made

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from nicegui import run, ui
 
@@ -39,6 +39,7 @@ class Verbs:
         names: Of its verbs; empty: all that there are.
         first: Keys of options that are shown unfolded, by verb.
         start: Words of the button.
+        unfolded: True if the numbers of results are unfolded.
         board: Commands and their results.
         filled: What was filled into the forms.
         verb: Name of the verb whose form is shown.
@@ -50,6 +51,7 @@ class Verbs:
     names: ClassVar[Sequence[str]] = ()
     first: ClassVar[Mapping[str, Sequence[str]]] = {}
     start: ClassVar[str] = "Start"
+    unfolded: ClassVar[bool] = False
 
     def __init__(self, bench: Workbench) -> None:
         """For a workbench, which keeps it."""
@@ -62,9 +64,12 @@ class Verbs:
         """Values of options beside those of the form, by key, which has no inputs for them."""
         return {}
 
-    async def show(self, view: View) -> None:
-        """Places results into the current slot."""
-        view.place()
+    def read(self, folder: Path) -> Any:
+        """What is placed before the numbers of results; another thread reads it."""
+        return ()
+
+    def place(self, read: Any) -> None:
+        """Places what `read` gave into the current slot."""
 
 
 class VerbPanel:
@@ -80,14 +85,14 @@ class VerbPanel:
         titles = {name: f"{name}: {commands[name].line}" for name in verbs.names or commands}
         with ui.row().classes("w-full items-center no-wrap"):
             choice = ui.select(titles, value=verbs.verb, label="what", with_input=not verbs.names)
-            choice.props("dense outlined").classes("col").mark(f"verb-{mark}")
+            choice.classes("col").mark(f"verb-{mark}")
             choice.set_visibility(len(titles) > 1)
             self.start = ui.button(verbs.start, icon="play_circle", on_click=self._start)
             self.start.props("no-caps").mark(f"start-{mark}")
         self._fields = ui.element("div").classes("w-full")
         with ui.row().classes("w-full items-center no-wrap"):
             self._choice = ui.select({}, label="results", on_change=self._choose)
-            self._choice.props("dense outlined").classes("col").mark(f"{mark}-results")
+            self._choice.classes("col").mark(f"{mark}-results")
             self._stop = ui.button(icon="stop", on_click=self._ask_to_stop).mark(f"{mark}-stop")
             self._stop.props('dense aria-label="Stop" title="Stop; what is finished is kept"')
             self._go_on = ui.button("Continue", on_click=self._ask_to_go_on)
@@ -203,7 +208,11 @@ class VerbPanel:
             folder = entry.folder
             view = await read_behind(lambda: View(read_numbers(folder), folder))
             if view is not None:
-                await self._verbs.show(view)
+                with show_errors():
+                    read = await read_behind(lambda: self._verbs.read(folder))
+                    if read is not None:
+                        self._verbs.place(read)
+                view.place(self._verbs.unfolded)
                 robot = view.robot or entry.about.get("robot", "")
                 results.show(name, Subject(robot, entry.digest(robot)))
 
@@ -217,16 +226,12 @@ def _stem(word: str) -> str:
 class Commands(Verbs):
     """Any verb with its form, and what it leaves."""
 
-    folder, result = "commands", ANSWER
+    folder, result, unfolded = "commands", ANSWER, True
     first: ClassVar = {"tension": ("pose", "method", "pulleys", "wrench")}
     empty = (
         "No result yet. Choose a question and press Start; a command about a robot takes the open "
         "one."
     )
-
-    async def show(self, view: View) -> None:
-        """Places results with their numbers unfolded."""
-        view.place(unfolded=True)
 
 
 def commands_panel(bench: Workbench) -> None:

@@ -118,7 +118,7 @@ class View:
 
     def _place_figures(self) -> None:
         chosen = ui.select(list(self.figures), value=next(iter(self.figures)), label="figure")
-        chosen.props("dense outlined").classes("w-full").mark("figure")
+        chosen.classes("w-full").mark("figure")
         place = ui.element("div").classes("w-full")
 
         def show() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from nicegui import run, ui
+from nicegui import ui
 from pydrake.geometry import Meshcat
 
 from cdpr_drake.analyses.visualization.solids import add_solid
@@ -27,10 +27,10 @@ from cdpr_drake.arrays import Array
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.proofs.box_figures import box_layers
 from cdpr_drake.proofs.certified_workspace import load_boxes
-from cdpr_drake.studio.panel import WORKSPACES, show_errors
+from cdpr_drake.studio.panel import WORKSPACES
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_panel import VerbPanel, Verbs
-from cdpr_drake.studio.views import View, read_numbers
+from cdpr_drake.studio.views import read_numbers
 
 REGIONS, PLANE = "workspaces", "workspaces/plane"
 """Paths in the scene: of all solids, and of the plane with colours."""
@@ -180,19 +180,17 @@ class Workspaces(Verbs):
         self.in_scene: Regions | None = None
         bench.results.changed.subscribe(self._follow, unsubscribe_on_delete=False)
 
-    async def show(self, view: View) -> None:
-        """Places what may be switched on in the scene, then all else that there is."""
-        folder = view.folder
-        assert folder is not None
-        with show_errors():
-            regions = await run.io_bound(read_regions, folder)
-            if regions is not None:  # the server is not ending
-                if self.regions is None or folder != self.regions.folder:
-                    self.plane, self.visible = None, {layer.name for layer in regions.layers[:1]}
-                self.regions = regions
-                _place_layers(regions, self)
-                _place_plane(regions, self)
-        view.place()
+    def read(self, folder: Path) -> Any:
+        """What a command computed."""
+        return read_regions(folder)
+
+    def place(self, read: Any) -> None:
+        """Places what may be switched on in the scene."""
+        if self.regions is None or read.folder != self.regions.folder:
+            self.plane, self.visible = None, {layer.name for layer in read.layers[:1]}
+        self.regions = read
+        _place_layers(read, self)
+        _place_plane(read, self)
 
     def show_layer(self, name: str, visible: bool) -> None:
         """Shows a layer, or hides it."""
@@ -278,10 +276,10 @@ def _place_plane(regions: Regions, shown: Workspaces) -> None:
     with ui.row().classes("w-full items-center"):
         names = [NOTHING, *regions.values]
         what = ui.select(names, value=plane.name, label="colour a plane by")
-        what.props("dense outlined").classes("col").mark("plane-of")
+        what.classes("col").mark("plane-of")
         axes = {k: AXES[k] for k in normals}
         across = ui.select(axes, value=plane.along, label="normal to")
-        across.props("dense outlined").classes("w-24").mark("plane-along")
+        across.classes("w-24").mark("plane-along")
     last = sizes[plane.along] - 1
     where = ui.slider(min=0, max=last, value=plane.index if plane.index >= 0 else last // 2)
     where.props('aria-label="place of the plane"').mark("plane-index")

@@ -8,10 +8,10 @@ from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
 
 from cdpr_drake.cli.studio import verbs
+from cdpr_drake.studio.document import with_value
 from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.page import make_page
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.document import with_value
 
 LONGEST = 1200.0
 """Nothing here takes as long, unless it hangs [s]."""

@@ -9,9 +9,9 @@ import pytest
 from nicegui import ElementFilter
 from nicegui.elements.keyboard import Keyboard
 
+from cdpr_drake.studio.document import with_value
 from cdpr_drake.studio.jobs import Job
 from cdpr_drake.studio.panel import PANELS, Panel
-from cdpr_drake.studio.document import with_value
 from tests.studio.pages import open_panel, shown, until
 
 ROBOT = "acrobot_large"

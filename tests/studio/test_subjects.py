@@ -8,11 +8,11 @@ import pytest
 from cdpr_drake.analyses.visualization.replay import RecordedScene
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import write_asked
+from cdpr_drake.studio.document import with_value
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import RunBoard
 from cdpr_drake.studio.workspace import Workspaces
-from cdpr_drake.studio.document import with_value
 from tests.studio.pages import field, in_scene, open_panel, problems, shown, until
 
 ROBOT, OTHER = "acrobot_small", "planar"

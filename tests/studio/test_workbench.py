@@ -9,12 +9,12 @@ import pytest
 
 from cdpr_drake.errors import CdprError, OutputFolderError, RobotFileError
 from cdpr_drake.models.robot_loader import load_robot, robot_names
+from cdpr_drake.studio.document import with_value
 from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.pose import answer_html
 from cdpr_drake.studio.pose_answer import PoseAnswer, RobotQuestions
 from cdpr_drake.studio.scene import R_EW, look_at_robot
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.document import with_value
 from tests.cli.commands import told
 from tests.studio.pages import settled
 

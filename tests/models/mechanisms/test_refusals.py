@@ -11,8 +11,7 @@ from cdpr_drake.cli.app import main
 from cdpr_drake.errors import RobotFileError, ScenarioError
 from cdpr_drake.models.mechanism_files import TAKEN_BY
 from cdpr_drake.models.robot_loader import load_robot, parse_robot, robot_file, robot_text
-from cdpr_drake.studio.files import WorkingFolder
-from cdpr_drake.studio.files import RobotFiles
+from cdpr_drake.studio.files import RobotFiles, WorkingFolder
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.systems.robots.cable_robot import CableRobot
 from tests.messages import printed
