@@ -82,12 +82,14 @@ class Board:
     Attributes:
         folder: What all results are below.
         shown: Key of what is looked at, of `choices`, the name of its folder; empty: nothing.
+        entry: What is looked at, by the last `follow`; None: nothing.
     """
 
     def __init__(self, jobs: JobManager, root: Path, name: str) -> None:
         """With the server's jobs, for the folder of a name in the working folder."""
         self._jobs, self._root, self.folder = jobs, root, root / name
         self.shown = ""
+        self.entry: Entry | None = None
         self._left: dict[str, Entry] = {}
         self._looks, self._looked = False, -LOOK_PERIOD
 
@@ -110,12 +112,17 @@ class Board:
                 entries.setdefault(key, one)
         return entries
 
-    def shown_entry(self) -> Entry | None:
-        """What is looked at; the newest if that is gone; None: there is nothing."""
+    def follow(self) -> dict[str, Entry]:
+        """Gives `choices`, and looks at the newest where what was looked at is gone."""
         choices = self.choices()
         if self.shown not in choices:
-            self.shown = next(iter(choices), "")
-        return choices.get(self.shown)
+            self.shown = self.newest(choices)
+        self.entry = choices.get(self.shown)
+        return choices
+
+    def newest(self, choices: Mapping[str, Entry]) -> str:
+        """Key of what is looked at where nothing is chosen; empty: nothing."""
+        return next(iter(choices), "")
 
     def is_whole(self, folder: Path) -> bool:
         """True if all results are in a folder."""

@@ -7,10 +7,11 @@ this program are logged as well, with their traceback.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
+from typing import Any
 
 from nicegui import app, ui
 
@@ -104,6 +105,13 @@ def robot_argument(bench: Workbench) -> str:
     if not (name := bench.command_name):
         raise CdprError("the robot is not saved as it is; save it in the panel Robot first")
     return str(bench.robot.path) if name == bench.file else name
+
+
+def offer(select: ui.select, options: Mapping[Any, str], value: Any) -> None:
+    """Changes options only where they are others: that closes a list that is unfolded."""
+    if select.options != options:
+        select.set_options(dict(options), value=value)
+    select.value = value
 
 
 def message(problem: BaseException) -> str:

@@ -18,7 +18,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import Entry
 from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.numbers import Pair, pair_table, pairs
-from cdpr_drake.studio.panel import COMPARED, RUN, robot_argument, show_errors
+from cdpr_drake.studio.panel import COMPARED, RUN, offer, robot_argument, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import (
@@ -398,10 +398,10 @@ class RunPanel:
         """Offers what runs there are, and shows the one looked at; returns the one behind it."""
         board = self._board
         choices = board.follow()
-        _offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
+        offer(self._run, {key: entry.name for key, entry in choices.items()}, board.shown or None)
         whole = [key for key, entry in choices.items() if entry.is_whole and key != board.shown]
         others = {"": "none"} | {key: key for key in whole}
-        _offer(self._compare, others, board.compared if board.compared in others else "")
+        offer(self._compare, others, board.compared if board.compared in others else "")
         if self._shown != identity(board.entry):
             self._shown, self._fold.value = identity(board.entry), False
             self._results.clear()
@@ -410,7 +410,7 @@ class RunPanel:
         names = enumerate(job.header.get("cables", ()))
         left = {k: name for k, name in names if k not in broken}
         value = self._cable.value if self._cable.value in left else next(iter(left), None)
-        _offer(self._cable, left, value)
+        offer(self._cable, left, value)
         is_endless = job.progress[0] is None
         if is_endless != self._bar.props.get("indeterminate", False):
             self._bar.props.set_bool("indeterminate", is_endless)
@@ -435,13 +435,6 @@ def _done_by_hand(job: RunJob) -> str:
         f"{event['t']:.2f} s: {event.get('words') or 'refused: ' + event['refused']}"
         for event in job.events
     )
-
-
-def _offer(select: ui.select, options: Mapping[Any, str], value: Any) -> None:
-    """Changes options only where they are others: that closes a list that is unfolded."""
-    if select.options != options:
-        select.set_options(dict(options), value=value)
-    select.value = value
 
 
 def _subject_named(robot: str) -> Subject | None:

@@ -287,7 +287,6 @@ class RunBoard(Board):
 
     Attributes:
         draft: The scenario that is worked on; None: none was chosen.
-        entry: What is looked at; None: nothing.
         run: What is shown of it: samples while it goes on, rows of its log when it is finished.
         other: The run behind it; None: there is none.
         compared: Key of the run behind the one that is shown; empty: none.
@@ -301,7 +300,6 @@ class RunBoard(Board):
         super().__init__(bench.jobs, bench.folder.root, RUNS)
         self._bench = bench
         self.draft: ScenarioDraft | None = None
-        self.entry: Entry | None = None
         self.run: RunJob | FinishedRun = NO_RUN
         self.other: FinishedRun | None = None
         self.compared, self.speed = "", "real time"
@@ -337,15 +335,16 @@ class RunBoard(Board):
             return ""
         return "unreadable" if self.entry.folder in self._unreadable else READING
 
+    def newest(self, choices: Mapping[str, Entry]) -> str:
+        """That which was begun last; of what others left nothing is looked at unasked."""
+        return next((key for key, entry in choices.items() if entry.job), "")
+
     def follow(self) -> dict[str, Entry]:
-        """What runs there are; the one that was begun last is looked at where none is chosen."""
-        choices = self.choices()
-        if self.shown not in choices:
-            self.shown = next((key for key, entry in choices.items() if entry.job), "")
+        """As every board, and shows another run where that is another one."""
+        before, choices = identity(self.entry), super().follow()
         if self.compared == self.shown:
             self.compared = ""
-        before, self.entry = self.entry, choices.get(self.shown)
-        if identity(before) != identity(self.entry):
+        if before != identity(self.entry):
             self.run = self.job
             self._unreadable.clear()
         return choices

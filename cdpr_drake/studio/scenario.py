@@ -133,7 +133,7 @@ class ScenarioForm:
         changed = {item.partition("=")[0].partition(".")[0] for item in draft.settings()}
         self._form = SettingsForm(
             draft.document, mark="field", common=[tuple(key.split(".")) for key in COMMON],
-            without=FIXED, opened=tuple(changed), lazy=True,
+            without=FIXED, opened=tuple(changed),
         )  # fmt: skip
 
     async def check(self) -> bool:

@@ -95,17 +95,16 @@ class SettingsForm:
     def __init__(
         self, document: Document[Any], *, mark: str = "cell", common: Sequence[Place] = (),
         without: Sequence[str] = (), first: Sequence[str] = (), opened: Sequence[str] = (),
-        lazy: bool = False,
     ) -> None:  # fmt: skip
         """Places the form into the current slot; marks of its inputs begin with `mark`.
 
         `common` are the places of fields above all groups, `without` names of fields at the top
         that are not shown, `first` of the sections above the others, and `opened` of groups that
-        are unfolded at the start. `lazy` groups are filled when they are unfolded.
+        are unfolded at the start; the others are filled when they are unfolded.
         """
         self._document, self._schema, self._mark = document, type(document.value), mark
         self._common, self._without, self._first = common, without, first
-        self._unfolded, self._lazy = set(opened), lazy
+        self._unfolded = set(opened)
         self._cells: list[_Cell] = []
         self._pending: dict[Place, tuple[_Cell, Any, str, Any]] = {}  # typed, why not, for what
         self._layout, self._path = None, document.path
@@ -146,7 +145,7 @@ class SettingsForm:
 
         def turn() -> None:
             (self._unfolded.add if fold.value else self._unfolded.discard)(name)
-            if not fold.default_slot.children and (fold.value or not self._lazy):
+            if fold.value and not fold.default_slot.children:
                 with fold:
                     fill()
 

@@ -16,7 +16,7 @@ from nicegui import run, ui
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.jobs import Job, JobState
-from cdpr_drake.studio.panel import ANSWER, STUDY, notify, robot_argument, show_errors
+from cdpr_drake.studio.panel import ANSWER, STUDY, notify, offer, robot_argument, show_errors
 from cdpr_drake.studio.results import Subject
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_form import Filled, VerbForm
@@ -148,24 +148,23 @@ class VerbPanel:
         self._refresh()
 
     def _ask_to_stop(self) -> None:
-        entry = self._board.shown_entry()
+        entry = self._board.entry
         if entry is not None and entry.job is not None:
             entry.job.stop()
         self._refresh()
 
     async def _ask_to_go_on(self) -> None:
-        entry = self._board.shown_entry()
+        entry = self._board.entry
         if entry is not None:
             await self._board.go_on(entry, self._bench.commands, self._bench.folder)
         self._refresh()
 
     def _refresh(self) -> Entry | None:
         """Follows jobs and folders; returns what is looked at."""
-        entry = self._board.shown_entry()
-        names = {key: one.name for key, one in self._board.choices().items()}
-        if names != self._choice.options:
-            self._choice.set_options(names)
-        self._choice.value = self._board.shown or None
+        board = self._board
+        names = {key: one.name for key, one in board.follow().items()}
+        offer(self._choice, names, board.shown or None)
+        entry = board.entry
         job = None if entry is None else entry.job
         working = job is not None and not job.state.is_over
         self._stop.set_enabled(working and job is not None and job.state != JobState.STOPPING)

@@ -56,7 +56,8 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     first = await board.start(VERBS["workspace"], WORDS, "some", about)
     assert board._jobs.free_folder(first.folder).name == "some-2"
     await until(lambda: first.progress[0] is not None)  # it listens to SIGTERM then
-    there = board.shown_entry()
+    board.follow()
+    there = board.entry
     assert (there.name, there.job) == ("some, running", first)
     with pytest.raises(CdprError, match="it works"):
         await board.go_on(there, VERBS, folder)
@@ -66,7 +67,8 @@ async def test_stop_keeps_what_is_finished_and_continue_goes_on_in_the_same_fold
     assert board.choices()["some"].job is first
     board = Board(JobManager(), tmp_path, "studies")  # as when the server was started anew
     await until(board.choices)
-    there = board.shown_entry()
+    board.follow()
+    there = board.entry
     assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
     assert there.about == about
     assert (there.digest("acrobot_small"), there.digest("planar")) == ("x", "")
@@ -119,7 +121,7 @@ async def test_a_file_asks_for_no_more_than_a_page_would(tmp_path, monkeypatch, 
     offered = {name: VERBS[name] for name in ("workspace", "study")}
     await until(board.choices)
     try:
-        await board.go_on(board.shown_entry(), offered, WorkingFolder(tmp_path))
+        await board.go_on(board.follow()[board.shown], offered, WorkingFolder(tmp_path))
     except CdprError:
         assert not runs
     assert len(board._jobs.jobs) == runs
