@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from collections.abc import Iterable
 from html import escape
-from typing import Any, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -42,31 +41,6 @@ class Summarized(ABC):
             for label, words in rows
         )
         return f"<table><caption>{escape(title)}</caption>{cells}</table>"
-
-
-class Tabulated(Summarized):
-    """A result that is also a table."""
-
-    @abstractmethod
-    def columns(self) -> Mapping[str, Any]:
-        """Columns by name, in SI units and radians unless a name says otherwise, all as long."""
-
-    def to_dataframe(self) -> Any:
-        """The columns as a pandas DataFrame."""
-        import pandas as pd  # some half a second, which few need
-
-        return pd.DataFrame(dict(self.columns()))
-
-
-def as_kind(kind: type[T], result: Any, **more: Any) -> T:
-    """A result as an object of a class of its own class that has more methods.
-
-    Args:
-        kind: A subclass of the result's dataclass.
-        result: The result.
-        more: Fields that the subclass has besides.
-    """
-    return kind(**{field.name: getattr(result, field.name) for field in fields(result)}, **more)
 
 
 def numbers(values: Iterable[float], digits: int = 4) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import threading
@@ -45,11 +44,6 @@ LOOK_PERIOD = 0.5
 def print_words(*words: object) -> None:
     """Prints words on stdout, in which names of files control no terminal."""
     print(plain_words(" ".join(map(str, words))))
-
-
-def print_json(found: Any) -> None:
-    """Prints results for other programs."""
-    print(json.dumps(found, indent=2))
 
 
 def message_console() -> Console:

@@ -37,29 +37,6 @@ def length_residuals(lengths: Array, unstrained: Array, tensions: Array, stiffne
     return np.asarray(lengths - unstrained * (1.0 + tensions / stiffness))
 
 
-def tension_residuals(wanted: Array, measured: Array) -> Array:
-    """By how much cables pull less than is wanted, shape (m,) [N]."""
-    return np.asarray(wanted - measured)
-
-
-def torque_residuals(
-    torques: Array, tensions: Array, speeds: Array, accelerations: Array, *,
-    radius: Array, viscous: float, inertia: float,
-) -> Array:  # fmt: skip
-    """Torque of motors that nothing but dry friction explains, shape (m,) [N m].
-
-    Args:
-        torques: Asked for, positive pays out, shape (m,) [N m].
-        tensions: Measured, shape (m,) [N].
-        speeds: Of the motors, shape (m,) [rad/s].
-        accelerations: Of the motors, shape (m,) [rad/s^2].
-        radius: rho of the drums over their gears, shape (m,) [m/rad].
-        viscous: F_v [N m s/rad].
-        inertia: J at the motor's shaft [kg m^2].
-    """
-    return np.asarray(torques + radius * tensions - viscous * speeds - inertia * accelerations)
-
-
 def threshold(
     sigma: float, *, bias: float = 0.0, samples: float, residuals: int, in_a_row: int,
     false_alarms: float,

@@ -20,9 +20,7 @@ from cdpr_drake.estimation.break_detection_kernel import LIMITS, NAMED, RESIDUAL
 from cdpr_drake.estimation.failure_detection import (
     AlarmRule,
     length_residuals,
-    tension_residuals,
     threshold,
-    torque_residuals,
 )
 from cdpr_drake.estimation.failure_watch import (
     EncoderWatch,
@@ -32,7 +30,6 @@ from cdpr_drake.estimation.failure_watch import (
 )
 from cdpr_drake.geometry.cable_paths import cable_paths, motion_of
 from cdpr_drake.models.robot_loader import load_robot
-from cdpr_drake.winches.motor import TORQUE, winch_motion
 
 ROBOT = load_robot("acrobot_large")
 CABLES, LAW = ROBOT.cable_set().without_pulleys(), ROBOT.winch_law()
@@ -134,23 +131,6 @@ def test_lengths_tell_taut_slack_and_broken_cables_apart():
     lengths = np.array([1.02, 0.9, 1.03])  # taut by its law, slack, and longer without a pull
     residuals = length_residuals(lengths, np.ones(3), tensions, np.full(3, 1000.0))
     assert residuals == pytest.approx([0.0, -0.1, 0.03], abs=1e-15)
-    wanted = np.array([3.0, 2.0])
-    assert np.array_equal(tension_residuals(wanted, np.array([3.0, 0.0])), [0.0, 2.0])
-
-
-@pytest.mark.parametrize("power", [1.0, 0.0])
-def test_a_motor_by_its_law_leaves_its_dry_friction_and_what_it_does_not_get(power):
-    law = load_robot("acrobot_small").winch_law()
-    zeros, home = np.zeros(2), np.ones(2)
-    rates, tensions, torques = np.array([0.02, -0.05]), np.array([5.0, 8.0]), np.array([-0.1, -0.3])
-    state = home, rates, zeros
-    motion = winch_motion(law, TORQUE, state, tensions, power * torques, zeros, home=home)
-    left = torque_residuals(
-        torques, tensions, motion.speed, motion.acceleration, radius=law.drum.turning(zeros)[0],
-        viscous=law.friction.viscous, inertia=law.inertia,
-    )  # fmt: skip
-    dry = np.sign(rates) * law.friction.dry(motion.speed)
-    assert left == pytest.approx(dry + (1.0 - power) * torques, rel=1e-9)
 
 
 # Motors and encoders.

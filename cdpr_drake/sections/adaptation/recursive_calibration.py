@@ -319,10 +319,6 @@ class RecursiveCalibration:
         """Share of each motion of `FRAMES`, in sizes of the prior, that was not excited, (12,)."""
         return np.array(self._record.views(memory)["frames"])
 
-    def has_begun(self, memory: Array) -> bool:
-        """Whether there was a look."""
-        return bool(self._record.views(memory)["begun"] > 0.0)
-
     def _begin(self, now: dict[str, Array], look: Look) -> None:
         """Says where the tag is, and that lengths count from here."""
         now["begun"][()] = 1.0
