@@ -1,8 +1,11 @@
 """The studio's page without a browser: NiceGUI's simulated user, and no plugin of pytest."""
 
 import asyncio
+import re
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from io import BytesIO
+from zipfile import ZipFile
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
@@ -121,12 +124,54 @@ def open_panel(user, name):
     tabs.value = name
 
 
+def unfold(user):
+    """Unfolds all groups of the robot's form, whose fields come then."""
+    with user:
+        for fold in ElementFilter(kind=ui.expansion):
+            if any(mark.startswith("cell-group-") for mark in fold._markers):
+                fold.value = True
+
+
 def type_into(user, name, words):
     """Types words into a field, and presses Enter."""
     found = user.find(marker=name)
     (element,) = found.elements
     element.value = words
     found.trigger("keydown.enter")
+
+
+async def do(user, *steps):
+    """Does one step after the other, each as soon as the page lets it.
+
+    `mark` clicks an element, `mark=words` types into it, `mark: words` waits until it has words.
+    """
+    for step in steps:
+        name, kind, words = re.fullmatch(r"([\w.-]+)(=|: ?|)(.*)", step, re.DOTALL).groups()
+        if kind.startswith(":"):
+            await until(lambda name=name, words=words: says(user, name, words), LONGEST)
+            continue
+        await until(lambda name=name: takes(user, name), LONGEST)
+        if kind:
+            type_into(user, name, words)
+        else:
+            user.find(marker=name).click()
+
+
+def seen(user, name):
+    """The elements with a mark that are to be seen."""
+    return user.find(marker=name).elements if shown(user, name) else ()
+
+
+def takes(user, name):
+    """Whether there are such elements, none of them disabled."""
+    elements = seen(user, name)
+    return bool(elements) and all(getattr(one, "enabled", True) for one in elements)
+
+
+def says(user, name, words):
+    """Whether one of them has some words: as text, HTML, value, refusal or option."""
+    keys = "text", "content", "value", "error", "options"
+    return any(words in str(getattr(one, key, "")) for one in seen(user, name) for key in keys)
 
 
 def problems(user):
@@ -140,3 +185,23 @@ def problems(user):
 def put(document, place, value):
     """Changes one value of a document."""
     document.change(with_value(document.text, place, value))
+
+
+@asynccontextmanager
+async def another_tab(user):
+    """The user does what is inside in another tab, and is back in this one then."""
+    first = user.client
+    second = await user.open("/")
+    await until(lambda: not shown(user, "panel-loading"))
+    try:
+        yield
+    finally:
+        second.delete()
+        user.client = first
+
+
+async def archive(user):
+    """Names and bytes of what is in the zip archive that the user gets."""
+    sent = await user.download.next(timeout=LONGEST)
+    with ZipFile(BytesIO(sent.content)) as file:
+        return {name: file.read(name) for name in file.namelist()}
