@@ -15,7 +15,7 @@ from cdpr_drake.studio.scenario import COMMON, ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.settings_form import SettingsForm, field_words, typed_value
 from cdpr_drake.systems.diagrams.load import load_scenario
 from cdpr_drake.systems.scenarios.files import robot_scenario_names, scenario_file
-from tests.studio.pages import do, field, put, shown, simulated, until
+from tests.studio.pages import do, field, put, shown, simulated, unfold, until
 
 TEXT = """\
 # a robot
@@ -176,7 +176,8 @@ async def test_every_field_is_shown_and_means_what_it_was(tmp_path):
     robots, scenarios, forms = robot_names()[::9], robot_scenario_names()[::12], []
     documents = [Document(robot_text(name), robot_file(name), parse_robot) for name in robots]
     documents += [ScenarioDraft(name, tmp_path).document for name in scenarios]
-    async with simulated(lambda: forms.extend(map(SettingsForm, documents))):
+    async with simulated(lambda: forms.extend(map(SettingsForm, documents))) as user:
+        unfold(user)
         for form, document in zip(forms, documents, strict=True):
             fields = list(places(document.value))
             above = {at[: k + 1] for at, *_ in fields for k in range(len(at))}
