@@ -11,7 +11,8 @@ import time
 from pathlib import Path
 
 from tests.chromium import complaints, wait_for
-from tests.studio.run_page import FRAMES, opened, press, text_of, wait_for_start, write_scenario
+from tests.studio.run_page import FRAMES, opened, press, text_of, write_scenario
+from tests.studio.served import LONGEST_START
 
 LONG = {"duration: 30.0": "duration: 300.0", "position: 0.0003": "position: 1.0e-9"}
 
@@ -32,7 +33,7 @@ def main(picture=""):
             press(page, "Run")
             wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
             press(page, "Start")
-            wait_for_start(page, f"{FRAMES}[1] > 20")
+            wait_for(page, f"{FRAMES}[1] > 20", LONGEST_START)
             told = {"with_scene": rate(page)}
             if picture:
                 page.save_screenshot(picture)

@@ -1,8 +1,11 @@
 """The studio's page without a browser: NiceGUI's simulated user, and no plugin of pytest."""
 
 import asyncio
+import re
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
+from io import BytesIO
+from zipfile import ZipFile
 
 from nicegui import ElementFilter, ui
 from nicegui.testing.user_simulation import user_simulation
@@ -43,43 +46,6 @@ async def opened_page(folder, robot="acrobot_large"):
             yield user, bench, user.client
     finally:
         calculator.shutdown(cancel_futures=True)
-
-
-class HeldPage:
-    """A page that stays open for several tests; what they do is done in the task that opened it."""
-
-    def __init__(self, folder, robot):
-        self._robot, self._loop, self._asked = robot, asyncio.new_event_loop(), asyncio.Queue()
-        self._task = self._loop.create_task(self._hold(folder))
-        self.user = self.bench = None
-
-    def run(self, steps):
-        """Waits for what a coroutine does in the page."""
-        done = self._loop.create_future()
-        self._asked.put_nowait((steps, done))
-        first = asyncio.wait([done, self._task], return_when=asyncio.FIRST_COMPLETED)
-        self._loop.run_until_complete(first)
-        return done.result() if done.done() else self._task.result()  # why it does not open
-
-    def close(self):
-        """Ends it."""
-        self._asked.put_nowait(None)
-        self._loop.run_until_complete(self._task)
-        self._loop.close()
-
-    async def begin(self):
-        """The robot as it was in the beginning, and nothing that was said."""
-        self.user.notify.messages.clear()
-        self.bench.take_opened(self.bench.files.open(self._robot))
-        await until(lambda: self.bench.answer is not None and not self.bench.is_computing)
-
-    async def _hold(self, folder):
-        async with opened_page(folder, self._robot) as (self.user, self.bench, _):
-            while (asked := await self._asked.get()) is not None:
-                try:
-                    asked[1].set_result(await asked[0])
-                except BaseException as problem:
-                    asked[1].set_exception(problem)
 
 
 async def settled(bench):
@@ -129,6 +95,40 @@ def type_into(user, name, words):
     found.trigger("keydown.enter")
 
 
+async def do(user, *steps):
+    """Does one step after the other, each as soon as the page lets it.
+
+    `mark` clicks an element, `mark=words` types into it, `mark: words` waits until it has words.
+    """
+    for step in steps:
+        name, kind, words = re.fullmatch(r"([\w.-]+)(=|: ?|)(.*)", step, re.DOTALL).groups()
+        if kind.startswith(":"):
+            await until(lambda name=name, words=words: says(user, name, words), LONGEST)
+            continue
+        await until(lambda name=name: takes(user, name), LONGEST)
+        if kind:
+            type_into(user, name, words)
+        else:
+            user.find(marker=name).click()
+
+
+def seen(user, name):
+    """The elements with a mark that are to be seen."""
+    return user.find(marker=name).elements if shown(user, name) else ()
+
+
+def takes(user, name):
+    """Whether there are such elements, none of them disabled."""
+    elements = seen(user, name)
+    return bool(elements) and all(getattr(one, "enabled", True) for one in elements)
+
+
+def says(user, name, words):
+    """Whether one of them has some words: as text, HTML, value, refusal or option."""
+    keys = "text", "content", "value", "error", "options"
+    return any(words in str(getattr(one, key, "")) for one in seen(user, name) for key in keys)
+
+
 def problems(user):
     """What the page says is wrong, beside fields and over the page."""
     with user:
@@ -140,3 +140,23 @@ def problems(user):
 def put(document, place, value):
     """Changes one value of a document."""
     document.change(with_value(document.text, place, value))
+
+
+@asynccontextmanager
+async def another_tab(user):
+    """The user does what is inside in another tab, and is back in this one then."""
+    first = user.client
+    second = await user.open("/")
+    await until(lambda: not shown(user, "panel-loading"))
+    try:
+        yield
+    finally:
+        second.delete()
+        user.client = first
+
+
+async def archive(user):
+    """Names and bytes of what is in the zip archive that the user gets."""
+    sent = await user.download.next(timeout=LONGEST)
+    with ZipFile(BytesIO(sent.content)) as file:
+        return {name: file.read(name) for name in file.namelist()}
