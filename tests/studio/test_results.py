@@ -241,7 +241,7 @@ async def test_workspaces_are_layers_with_the_numbers_of_the_command_and_a_plane
     await do(user, "tab-workspace")
     view = bench.kept(workspace.Workspaces)
     await until(lambda: view.regions is not None)
-    numbers = read_numbers(view.regions.folder)["workspaces"]
+    numbers = json.loads((view.regions.folder / "results.json").read_text())["workspaces"]
     assert [layer.name for layer in view.regions.layers] == ["all", "static", "wrench-feasible"]
     for layer in view.regions.layers:
         assert (layer.share, layer.volume) == words_of(numbers[layer.name])
