@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,18 @@ LONGEST_WAIT = 300.0
 
 POLL = 0.1
 """Time between two looks [s]; Selenium's own half a second would be most of what a test takes."""
+
+AXE = """
+const done = arguments[arguments.length - 1];
+axe.run({exclude: ['.q-icon.text-negative']},
+        {resultTypes: ['violations'], iframes: false}).then(found => done(
+    found.violations.flatMap(rule => rule.nodes
+        .filter(node => ['serious', 'critical'].includes(node.impact))
+        .map(node => `${rule.id}: ${node.target.join(' ')}: ${node.html.slice(0, 160)}`))),
+    problem => done(['axe failed: ' + problem]));
+"""
+"""Without what is in frames: Drake's scene is Meshcat's page, not ours. Without Quasar's sign beside
+words that say what is wrong, whose red is dark on dark."""
 
 
 @contextmanager
@@ -76,3 +90,20 @@ def complaints(page: Any) -> list[str]:
     """What pages said that is an error, or wanted from a network."""
     said = [(line["level"], line["message"]) for line in page.get_log("browser")]
     return [words for level, words in said if level == "SEVERE" or "net::" in words]
+
+
+def axe_file() -> Path:
+    """axe.min.js, named by `AXE_FILE` or of axe-core-python; without one the test is skipped."""
+    if "AXE_FILE" in os.environ:
+        return Path(os.environ["AXE_FILE"])
+    found = find_spec("axe_core_python")
+    if found is None or found.origin is None:
+        pytest.skip("axe-core-python is not installed (pip install '.[test]')")
+    return Path(found.origin).with_name("axe.min.js")
+
+
+def grave(page: Any) -> list[str]:
+    """What axe-core finds serious or critical in a page as it is shown now, one line each."""
+    if not page.execute_script("return typeof axe !== 'undefined'"):
+        page.execute_script(axe_file().read_text(encoding="utf-8"))
+    return page.execute_async_script(AXE)

@@ -17,9 +17,8 @@ from urllib.parse import unquote, urlsplit
 
 from fontTools.ttLib import TTFont
 
-from tests.chromium import LONGEST_WAIT, chromium, wait_for
+from tests.chromium import LONGEST_WAIT, chromium, grave, wait_for
 from tests.docs.make_equations_font import FONT
-from tests.studio.axe import grave
 
 UNREAD = ("code", "pre", "script", "style", "math", "textarea", "svg", "noscript")
 """Elements whose text is no prose."""

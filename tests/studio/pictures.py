@@ -1,34 +1,54 @@
-"""Pictures of the studio to be looked at: each tab with results at full length, and each dialog.
+"""Pictures of the studio to be looked at: each tab, with results also at full length, and dialogs.
 
-`python -m tests.studio.pictures FOLDER`, or with `--guide` the pictures of docs/guides/studio.md.
+`python -m tests.studio.pictures FOLDER`, or `FOLDER --guide`: those of docs/guides/studio.md too.
 """
 
-import argparse
-import io
 import json
 import subprocess
 import sys
 import tempfile
 import time
+from itertools import product
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 from selenium.webdriver import Keys
 
-from cdpr_drake.analyses.logs.replay import replay_log
-from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.studio.boards import ASKED, write_asked
+from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import subject_of
-from cdpr_drake.systems.diagrams.load import load_scenario
-from tests.chromium import LONGEST_WAIT, chromium, wait_for
+from tests.chromium import chromium, wait_for
 from tests.studio.run_page import press, text_of
 from tests.studio.served import served
 
 SIZES = {"1280": (1280, 800), "phone": (390, 844)}
 
 IMAGES = Path(__file__).parents[2] / "docs" / "images"
+GUIDE = {
+    "robot_1280_light": "studio", "robot_1280_dark": "studio_dark",
+    "logs_1280_light": "studio_logs", "drag_1280_light": "studio_drag",
+}  # fmt: skip
+"""Pictures of the guide, by those of the folder."""
+
+VIEWER = "document.getElementById('scene')?.contentWindow.viewer"
+
+DRAWN = f"""({VIEWER}?.scene_tree.find(['drake', 'studio', 'exit', '7']).object !== undefined &&
+    Object.keys({VIEWER}.scene_tree.find(['drake', 'cables']).children).length === 8 &&
+    {VIEWER}.renderer.domElement.studioListens)"""
+"""A robot of eight cables is in the scene, which follows the mouse."""
+
+POINT = """
+const scene = document.getElementById('scene'), viewer = scene.contentWindow.viewer;
+const canvas = viewer.renderer.domElement;
+viewer.scene.updateMatrixWorld(true);
+viewer.camera.updateMatrixWorld(true);
+const point = viewer.scene_tree.find(['drake', 'studio', 'exit', '1']).object;
+const p = point.position.clone().setFromMatrixPosition(point.matrixWorld).project(viewer.camera);
+const box = canvas.getBoundingClientRect();
+const x = box.left + (p.x + 1) / 2 * box.width, y = box.top + (1 - p.y) / 2 * box.height;
+"""
+"""Where the exit point of C2 is in the scene's frame [px]."""
 
 CHOOSE = """
 const of = (e) => e.querySelector('.q-field__label')?.innerText;
@@ -60,111 +80,69 @@ def look(page, size, dark, height=0):
 
 def fill(folder):
     """A run, its log beside the model of its robot, a workspace and a study."""
-    words = ["workspace", "acrobot_small", "--grid=9,9,9", f"--out={folder / 'workspaces/small'}"]
-    subprocess.run([sys.executable, "-m", "cdpr_drake", *words], check=True)
+    run = folder / "runs" / "acrobot_pbvs"
+    for words in (
+        ["workspace", "acrobot_small", "--grid=9,9,9", f"--out={folder / 'workspaces' / 'small'}"],
+        ["simulate", "acrobot_pbvs", "--set=camera.kind=projected", "--set=duration=2.0",
+         f"--out={run}"],
+        ["replay", run / "log.csv", "--robot=acrobot_small", f"--out={folder / 'logs' / run.name}"],
+    ):  # fmt: skip
+        subprocess.run([sys.executable, "-m", "cdpr_drake", *words], check=True)
     study = folder / "studies" / "tension-methods"
     study.mkdir(parents=True)
     said = {"words": "methods agree", "printed": "1", "found": "1", "verdict": "confirmed"}
     (study / "results.json").write_text(json.dumps({"study": "x", "statements": [said]}))
-    run = folder / "runs" / "acrobot_pbvs"
-    simulate(load_scenario("acrobot_pbvs", ["camera.kind=projected", "duration=2.0"]), folder=run)
-    replay_log(run / "log.csv", robot="acrobot_small", out=folder / "logs" / "acrobot_pbvs")
     about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
     write_asked(folder / "logs" / f".acrobot_pbvs{ASKED}", (), about)
 
 
-def shot(page):
-    """What the page looks like."""
-    return Image.open(io.BytesIO(page.get_screenshot_as_png())).convert("RGB")
-
-
-def keep(page, name):
-    """Writes a picture of the guide, small, with cables that keep their colours."""
-    shot(page).save(IMAGES / name, quality=80, method=6)
-
-
-def wait_for_scene(page):
-    """Returns once the robot is drawn; an empty scene is grey but for its axes."""
-    end = time.monotonic() + LONGEST_WAIT
-    coloured = 0
-    while coloured < 800:
-        if time.monotonic() > end:
-            raise TimeoutError("the scene shows no robot")
-        time.sleep(1.0)
-        pixels = np.asarray(shot(page), int)
-        scene = pixels[100:, pixels.shape[1] * 6 // 10 :]
-        coloured = np.count_nonzero(np.ptp(scene, axis=2) > 60)
-
-
-def tabs(page):
-    """Turns to each tab, and waits until fonts and numbers are there."""
-    labels = "[...document.querySelectorAll('.q-tab__label')].map(e => e.textContent)"
-    for title in page.execute_script(f"return {labels}"):
-        press(page, title)
-        time.sleep(4.0)
-        yield title.lower()
-
-
 def photograph(page, size, dark, folder):
-    """Takes pictures of all tabs and dialogs."""
-    kind = f"{size}_{'dark' if dark else 'light'}.png"
-    for name in tabs(page):
+    """Takes pictures of all tabs and dialogs, and at last of an exit point that was moved."""
+
+    def keep(name):
+        time.sleep(4.0)  # fonts and numbers come
+        kind = f"{size}_{'dark' if dark else 'light'}"
+        page.save_screenshot(str(folder / f"{name.lower().replace(' ', '_')}_{kind}.png"))
+
+    look(page, size, dark)
+    wait_for(page, DRAWN)
+    for panel in PANELS.values():
+        press(page, panel.title)
+        keep(panel.title)
         page.execute_script(CHOOSE)
         time.sleep(4.0)
         look(page, size, dark, page.execute_script(LONG))
-        time.sleep(1.0)
-        page.save_screenshot(str(folder / f"{name}_{kind}"))
+        keep(f"{panel.title}_whole")
         look(page, size, dark)
     press(page, "Robot")
     for words in ("Open", "Save as", "Export", "As text", "Add cable"):
         press(page, words)
         wait_for(page, "document.querySelector('.q-dialog') !== null")
-        time.sleep(1.0)
-        page.save_screenshot(str(folder / f"dialog_{words.lower().replace(' ', '_')}_{kind}"))
+        keep(f"dialog_{words}")
         page.find_element("css selector", "body").send_keys(Keys.ESCAPE)
         wait_for(page, "document.querySelector('.q-dialog') === null")
+    field = page.find_element("css selector", 'input[aria-label="cables 0 exit point x"]')
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys("-0.3", Keys.ENTER)
+    wait_for(page, f"{text_of('.studio-live')}.includes('refined')")
+    keep("drag")
 
 
-def photograph_guide(page, dark):
-    """Takes the pictures of the guide; the last has an exit point elsewhere, and its workspace."""
-    wait_for_scene(page)
-    names = {"robot": "studio_dark.webp"}
-    if not dark:
-        names = {"robot": "studio.webp", "logs": "studio_logs.webp"}
-    for name in tabs(page):
-        if name in names:
-            keep(page, names[name])
-    if not dark:
-        press(page, "Robot")
-        field = page.find_element("css selector", 'input[aria-label="cables 0 exit point x"]')
-        field.send_keys(Keys.CONTROL, "a")
-        field.send_keys("-0.3", Keys.ENTER)
-        wait_for(page, f"{text_of('.studio-live')}.includes('refined')")
-        time.sleep(4.0)
-        keep(page, "studio_drag.webp")
-
-
-def main():
+def main(folder, guide=""):
     """Writes them."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("folder", type=Path, nargs="?", default=IMAGES)
-    options.add_argument("--guide", action="store_true")
-    asked = options.parse_args()
-    asked.folder.mkdir(parents=True, exist_ok=True)
-    looks = [(size, dark) for size in SIZES for dark in (False, True)]
-    with tempfile.TemporaryDirectory() as folder:
-        fill(Path(folder))
-        with served(folder, "acrobot_small") as (address, _):
-            for size, dark in looks[: 2 if asked.guide else None]:
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as work:
+        fill(Path(work))
+        with served(work, "acrobot_small") as (address, _):
+            for size, dark in product(SIZES, (False, True)):
                 with tempfile.TemporaryDirectory() as profile, chromium(Path(profile)) as page:
-                    look(page, size, dark)
                     page.get(address)
-                    wait_for(page, "document.querySelectorAll('.q-tab').length > 0")
-                    if asked.guide:
-                        photograph_guide(page, dark)
-                    else:
-                        photograph(page, size, dark, asked.folder)
+                    photograph(page, size, dark, folder)
+    for name, of_guide in GUIDE.items() if guide else ():
+        picture = Image.open(folder / f"{name}.png").convert("RGB")
+        picture.save(IMAGES / f"{of_guide}.webp", quality=80, method=6)
 
 
 if __name__ == "__main__":
-    main()
+    main(*sys.argv[1:])

@@ -5,27 +5,24 @@ import gc
 
 import httpx
 import pytest
-from starlette.responses import PlainTextResponse
 
-from cdpr_drake.cli.app import main
 from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.door import BENCH, MOST_SESSIONS, Door, Sessions
 from cdpr_drake.studio.page import SCENE
+from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.server import LARGEST_MESSAGE, MOST_BEHIND, hand_on
-from tests.messages import printed
+from tests.cli.commands import run
 from tests.studio.pages import until
 from tests.studio.served import served
 
 TOKEN = "secret-token-of-a-test"
-HOST, COOKIE_NAME = "127.0.0.1:80", "cdpr_studio_80"
-REFUSED = [{"type": "websocket.close", "code": 1008}]
+PASS = f"token={TOKEN}"
+HOST, NAME = "127.0.0.1:80", "cdpr_studio_80"
 
 
 async def inside(scope, receive, send):
-    if scope["type"] == "websocket":
-        await send({"type": "websocket.accept"})
-    else:
-        await PlainTextResponse(scope[BENCH])(scope, receive, send)
+    await send({"status": 200})
+    await send({"body": scope[BENCH].encode()})
 
 
 async def bench(session):
@@ -36,32 +33,32 @@ def door(token=TOKEN, port=80, host="127.0.0.1", bench=bench):
     return Door(inside, host, token, port, bench)
 
 
-def sent(*headers, kind="http", to=None, query="", path="/", method="GET"):
-    """What a door sends to who asks with headers."""
+def ask(
+    to=None, *, kind="http", host=HOST, cookie=None, origin=(), query="", path="/", method="GET"
+):
+    """Status, headers and body of an answer, or the message that closes a WebSocket."""
+    told = {"host": host, "cookie": COOKIE if cookie is None else cookie, "origin": origin}
+    headers = [
+        (name.encode(), value.encode("latin-1"))
+        for name, values in told.items()
+        for value in ([values] if isinstance(values, str) else values)
+    ]
+    scope = {"type": kind, "path": path, "query_string": query.encode(), "method": method,
+             "headers": headers}  # fmt: skip
     messages = []
 
     async def send(message):
         messages.append(message)
 
-    scope = {
-        "type": kind, "path": path, "query_string": query.encode(), "method": method,
-        "headers": [(k.encode(), v.encode("latin-1")) for k, v in headers],
-    }  # fmt: skip
     asyncio.run((to or door())(scope, None, send))
-    return messages
-
-
-def ask(*, host=HOST, cookie=None, origin=None, **options):
-    """Status, headers and body of an answer."""
-    headers = [("host", host), ("cookie", COOKIE if cookie is None else cookie)]
-    headers += [] if origin is None else [("origin", origin)]
-    start, body = sent(*headers, **options)
-    return start["status"], dict(start["headers"]), body["body"].decode()
+    start, *rest = messages
+    words = b"".join(one["body"] for one in rest).decode()
+    return start.get("status", start), dict(start.get("headers", ())), words
 
 
 def new_cookie(token=TOKEN, port=80):
     """A cookie of such a door, as a browser sends it back."""
-    headers = ask(cookie="", query=f"token={token}", to=door(token, port))[1]
+    headers = ask(door(token, port), cookie="", query=f"token={token}")[1]
     return headers[b"set-cookie"].decode().partition(";")[0]
 
 
@@ -75,56 +72,49 @@ COOKIE = new_cookie()
      ("Studio.example", ["studio.example:80", "10.0.0.1"])],
 )  # fmt: skip
 def test_names_of_this_machine(bound, hosts):
-    answers = {host: ask(host=host, to=door(host=bound))[0] for host in [*hosts, "evil.example"]}
+    answers = {host: ask(door(host=bound), host=host)[0] for host in [*hosts, "evil.example"]}
     assert answers == dict.fromkeys(hosts, 200) | {"evil.example": 403}
 
 
-@pytest.mark.parametrize(
-    ("header", "wrong"),
-    [("host", [
+WRONG = {
+    "Host: found": [{"host": host} for host in (
         "evil.example", "127.0.0.1.evil.example:80", "", "192.168.1.7", "evil.com\\@127.0.0.1",
         "evil.com@127.0.0.1", "127.0.0.1:80@evil.com", "127.0.0.1/evil.com", "127.0.0.1#evil.com",
         "127.0.0.1?evil.com", " 127.0.0.1", "127.0.0.1 evil.com", "127.0.0.1:", "127.0.0.1:x",
         "127.0.0.1\tevil.com", "[::1", "::1", "[::1]evil.com", "[::1%25evil.com]", "127.1",
         "127.0.0.1:80:80", "127.0.0.1,evil.com", "\u00b9\u00b27.0.0.1", "2130706433", "0x7f.1",
-        "localhost.",
-    ]),
-     ("origin", [
+        "localhost.", [], [HOST, "evil.example"], ["evil.example", HOST],
+    )],
+    "Origin: found": [{"origin": origin} for origin in (
         "http://evil.example", "http://127.0.0.1:81", "null", "", "http://localhost:80",
         "http://evil.com\\@127.0.0.1:80", "http://x@127.0.0.1:80", "ftp://127.0.0.1:80",
         "127.0.0.1:80", "http://127.0.0.1:80/", "http://127.0.0.1:80 evil",
-    ])],
-)  # fmt: skip
-def test_other_names_and_other_pages_are_refused(header, wrong):
-    for words in wrong:
-        status, _, said = ask(**{header: words})
-        assert (status, said.partition(":")[0]) == (403, header.title()), words
+    )],
+    "A cookie is missing": [{"cookie": cookie} for cookie in (
+        "", COOKIE + "x", COOKIE[:-1], COOKIE.replace(".", ""), f"{NAME}=.", TOKEN,
+        f"{NAME}={TOKEN}", COOKIE.replace("_80", "_81"), COOKIE + "\u00e9",
+        new_cookie(port=81).replace("_81", "_80"), new_cookie(TOKEN + "2"),
+    )] + [{"cookie": "", "query": PASS} | other for other in (
+        {"query": f"TOKEN={TOKEN}"}, {"method": "POST"}, {"path": "/scene/"},
+        {"path": "//evil.example/x"},
+    )],
+    "The token is wrong": [{"query": query, "cookie": cookie} for query in (
+        "token=", f"{PASS}x", PASS[:-1], f"{PASS}&token=wrong", "token=%ff%00",
+    ) for cookie in ("", COOKIE)],
+}  # fmt: skip
 
 
-def test_a_page_of_the_studio_is_let_in_and_a_second_name_or_none_is_refused():
-    assert ask(origin=f"http://{HOST}")[0] == 200
-    own, evil, cookie = ("host", HOST), ("host", "evil.example"), ("cookie", COOKIE)
-    for headers in ([own, evil, cookie], [evil, own, cookie], [cookie]):
-        assert sent(*headers)[0]["status"] == 403
-
-
-@pytest.mark.parametrize(
-    ("query", "words"),
-    [("", "A cookie is missing"), ("token=", "The token is wrong"), (f"token={TOKEN}x", "is wrong"),
-     (f"token={TOKEN[:-1]}", "is wrong"), (f"token={TOKEN}&token=wrong", "is wrong"),
-     ("token=%ff%00", "is wrong"), (f"TOKEN={TOKEN}", "is missing")],
-)  # fmt: skip
-def test_without_the_token_nobody_gets_in(query, words):
-    status, headers, said = ask(cookie="", query=query)
-    assert (status, said.count("\n"), words in said) == (403, 1, True)
-    assert headers[b"cache-control"] == b"no-store"
-    assert TOKEN not in said
-    assert b"set-cookie" not in headers
-    assert ask(query=query)[0] == (403 if "wrong" in words else 200)  # who has a cookie
+@pytest.mark.parametrize("words", WRONG)
+def test_what_is_wrong_is_refused_in_a_line(words):
+    for asked in WRONG[words]:
+        status, headers, said = ask(**asked)
+        assert (status, said.count("\n"), words in said) == (403, 1, True), asked
+        assert (headers[b"cache-control"], b"set-cookie" in headers) == (b"no-store", False)
+        assert TOKEN not in said
 
 
 def test_the_token_is_exchanged_for_a_cookie_of_a_new_session():
-    status, headers, said = ask(cookie="", query=f"token={TOKEN}")
+    status, headers, said = ask(cookie="", query=PASS)
     assert status == 200
     assert 'content="0;url=/"' in said  # the browser goes on, without the token
     assert headers[b"referrer-policy"] == b"no-referrer"
@@ -132,38 +122,38 @@ def test_the_token_is_exchanged_for_a_cookie_of_a_new_session():
     assert TOKEN not in said + new
     assert {word.lower() for word in others} == {"path=/", "httponly", "samesite=strict"}
     assert ask(cookie=new)[2] == new.partition("=")[2].split(".")[0] != ask()[2]
-    for wrong in (new + "x", new[:-1], new.replace(".", ""), f"{COOKIE_NAME}=.", TOKEN,
-                  f"{COOKIE_NAME}={TOKEN}", new.replace("_80", "_81"), new + "\u00e9",
-                  new_cookie(port=81).replace("_81", "_80"), new_cookie(TOKEN + "2")):  # fmt: skip
-        assert ask(cookie=wrong)[0] == 403, wrong
+    assert b"set-cookie" not in ask(query=PASS)[1]  # who has one keeps it
     # Cookies of other servers of this machine are passed over.
-    assert ask(cookie=f'a={{"x": [1, 2]}}; {COOKIE_NAME}=toss.ed; b; =c; {new}')[0] == 200
+    assert ask(cookie=f'a={{"x": [1, 2]}}; {NAME}=toss.ed; b; =c; {new}')[0] == 200
 
 
-def test_a_cookie_is_kept_and_handed_out_for_the_page_only():
-    query = f"token={TOKEN}"
-    assert b"set-cookie" not in ask(query=query)[1]
-    for other in {"method": "POST"}, {"path": "/scene/"}, {"path": "//evil.example/x"}:
-        assert ask(cookie="", query=query, **other)[0] == 403
-
-
-def test_websockets_need_the_cookie_and_a_page_of_the_studio():
-    own, cookie, evil = ("host", HOST), ("cookie", COOKIE), ("origin", "http://evil.example")
-    for headers in ([own], [own, cookie, evil]):
-        assert sent(*headers, kind="websocket", query=f"token={TOKEN}") == REFUSED
-    page = ("origin", f"http://{HOST}")
-    assert sent(own, cookie, page, kind="websocket") == [{"type": "websocket.accept"}]
+def test_pages_of_the_studio_are_let_in_and_their_websockets():
+    page, closed = f"http://{HOST}", {"type": "websocket.close", "code": 1008}
+    assert ask(origin=page)[0] == ask(kind="websocket", origin=page)[0] == 200
+    for wrong in {"cookie": ""}, {"origin": "http://evil.example"}:
+        assert ask(kind="websocket", query=PASS, **wrong)[0] == closed
 
 
 def test_without_a_token_sessions_are_told_by_cookies_all_the_same():
     to = door("")
-    status, headers, said = ask(cookie="", to=to)
+    status, headers, said = ask(to, cookie="")
     assert (status, 'url=/?cookie=set"' in said) == (200, True)
     new = headers[b"set-cookie"].decode().partition(";")[0]
-    assert ask(cookie=new, to=to)[0] == ask(cookie="", to=to, query="token=")[0] == 200
-    assert ask(cookie="", to=to, query="cookie=set")[0] == 403
-    for wrong in ("", f"{COOKIE_NAME}=x.y", COOKIE):
-        assert ask(cookie=wrong, to=to, path="/scene/")[0] == 403
+    assert ask(to, cookie=new)[0] == ask(to, cookie="", query="token=")[0] == 200
+    assert ask(to, cookie="", query="cookie=set")[0] == 403
+    for wrong in ("", f"{NAME}=x.y", COOKIE):
+        assert ask(to, cookie=wrong, path="/scene/")[0] == 403
+
+
+def test_a_workbench_that_cannot_be_made_is_said_and_none_is_made_without_a_cookie():
+    async def gone(session):
+        raise CdprError(f"robot.yaml: gone for {session}")
+
+    status, _, said = ask(door(bench=gone))
+    assert (status, said[:21]) == (500, "robot.yaml: gone for ")
+    for wrong in {"cookie": ""}, {"host": "evil.com"}, {"query": "token=wrong"}:
+        assert ask(door(bench=gone), **wrong)[0] == 403
+    assert ask(door(bench=gone), cookie="", query=PASS)[0] == 200
 
 
 async def test_each_session_has_a_workbench_and_those_that_nobody_looks_at_make_room():
@@ -186,39 +176,35 @@ async def test_each_session_has_a_workbench_and_those_that_nobody_looks_at_make_
     assert await sessions.bench("0") is first
 
 
-def test_a_workbench_that_cannot_be_made_is_said_and_none_is_made_without_a_cookie():
-    async def gone(session):
-        raise CdprError(f"robot.yaml: gone for {session}")
-
-    to = door(bench=gone)
-    status, _, said = ask(to=to)
-    assert (status, said[:21]) == (500, "robot.yaml: gone for ")
-    for refused in ({"cookie": ""}, {"host": "evil.com"}, {"query": "token=wrong"}):
-        assert ask(to=to, **refused)[0] == 403
-    assert ask(cookie="", query=f"token={TOKEN}", to=to)[0] == 200
-
-
 UPGRADE = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13",
            "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}  # fmt: skip
 
 
-def test_nothing_of_a_server_is_open_to_who_has_no_cookie(studio):
-    home, _, query = studio[1].partition("/?")
-    socket = "/_nicegui_ws/socket.io/?EIO=4&transport="
-    with httpx.Client(base_url=home, timeout=600.0) as client:
-        client.get(f"/?{query}")
-        page = client.get("/").text
-        static = page[page.index("/_nicegui/") :].partition('"')[0]
-        assert [client.get(path).status_code for path in (static, SCENE)] == [200, 200]
+def test_a_server_gives_the_page_with_a_panel_and_nothing_to_who_has_no_cookie(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("CDPR_STUDIO_TOKEN", TOKEN)
+    socket = "_nicegui_ws/socket.io/?EIO=4&transport="
+    with served(tmp_path) as (home, process), httpx.Client(timeout=600.0) as client:
+        for query, status in (f"?{PASS}x", 403), (f"?{PASS}", 200):
+            assert client.get(home + query).status_code == status
+        page = client.get(home).text
+        static = page[page.index("/_nicegui/") + 1 :].partition('"')[0]
+        assert [client.get(home + path).status_code for path in (static, SCENE[1:])] == [200, 200]
+        client.cookies.clear()
+        for path in ("", static, SCENE[1:], f"{SCENE[1:]}meshcat.js", "favicon.ico", "nothing",
+                     "docs", f"{socket}polling", "_nicegui/x"):  # fmt: skip
+            for method in ("GET", "POST", "HEAD"):
+                answer = client.request(method, home + path)
+                assert (answer.status_code, answer.headers["cache-control"]) == (403, "no-store")
+                assert answer.text.count("\n") == (method != "HEAD"), path
+        for path in (f"{socket}websocket", SCENE[1:]):
+            assert client.get(home + path, headers=UPGRADE).status_code == 403, path
     assert '<html lang="en' in page  # programs that read pages aloud choose a voice by it
-    for path in ("/", static, SCENE, f"{SCENE}meshcat.js", "/favicon.ico", "/nothing", "/docs",
-                 f"{socket}polling", "/_nicegui/x"):  # fmt: skip
-        for method in ("GET", "POST", "HEAD"):
-            answer = httpx.request(method, home + path, timeout=600.0)
-            assert (answer.status_code, answer.headers["cache-control"]) == (403, "no-store")
-            assert answer.text.count("\n") == (method != "HEAD"), path
-    for path in (f"{socket}websocket", SCENE):
-        assert httpx.get(home + path, headers=UPGRADE, timeout=600.0).status_code == 403, path
+    assert "exit point" in page
+    waiting = [panel.title for panel in PANELS.values() if f"{panel.title}: loading" in page]
+    assert waiting == ["Pose", "Workspace", "Run", "Logs", "Studies", "Commands"]
+    assert TOKEN not in "".join(process.said)  # it was set
 
 
 @pytest.mark.parametrize(
@@ -226,7 +212,6 @@ def test_nothing_of_a_server_is_open_to_who_has_no_cookie(studio):
     [("--no-token", TOKEN, "--no-token: found it with CDPR_STUDIO_TOKEN set"),
      ("", "", "CDPR_STUDIO_TOKEN: found an empty text"),
      ("", "short", "token: found 5 characters; accepted: 16 to 200"),
-     ("", "with blanks inside it", "token: found 21 characters"),
      ("", "x" * 201, "token: found 201 characters"),
      ("", "a&token=bbbbbbbbbbbb", "token: found 20 characters"),
      ("", "é" * 20, "token: found 20 characters"),
@@ -236,53 +221,31 @@ def test_nothing_of_a_server_is_open_to_who_has_no_cookie(studio):
 def test_what_is_refused_at_the_start(tmp_path, monkeypatch, capsys, options, variable, words):
     if variable is not None:
         monkeypatch.setenv("CDPR_STUDIO_TOKEN", variable)
-    with pytest.raises(SystemExit) as ended:
-        main(["studio", "no_such", "--folder", str(tmp_path), *options.split()])
-    assert ended.value.code == 2
-    said = printed(capsys)
-    assert f"\ncdpr: {words}" in f"\n{said.err}"
-    assert TOKEN not in said.out + said.err
+    code, out, err = run(capsys, "studio", "no_such", "--folder", tmp_path, *options.split())
+    assert (code, f"\ncdpr: {words}" in f"\n{err}", TOKEN in out + err) == (2, True, False)
 
 
-def test_a_token_that_is_set_is_not_printed(tmp_path, monkeypatch):
-    monkeypatch.setenv("CDPR_STUDIO_TOKEN", TOKEN)
-    with served(tmp_path) as (address, process):
-        assert "token" not in address
-        for query, status in ("", 403), (f"?token={TOKEN}", 200), (f"?token={TOKEN}x", 403):
-            assert httpx.get(address + query, timeout=600.0).status_code == status
-    assert TOKEN not in "".join(process.said)
+PIECE = 1_000_000
 
 
-@pytest.mark.parametrize("had_scene", [False, True])
-async def test_a_browser_that_takes_no_more_of_a_scene_is_let_go(had_scene):
-    piece, taken = bytes(1_000_000), []
+@pytest.mark.parametrize(
+    ("stops", "behind"), [(0, LARGEST_MESSAGE // PIECE), (3, MOST_BEHIND // PIECE), (200, -1)]
+)
+async def test_a_browser_gets_a_scene_in_order_until_it_takes_no_more_of_it(stops, behind):
+    taken, got = [], []
 
     async def scene():
-        for _ in range(200):
-            taken.append(piece)
-            yield piece
+        for number in range(200):
+            taken.append(number)
+            yield bytes([number]) * PIECE
             await asyncio.sleep(0)
-
-    async def send(_):
-        if not had_scene or len(taken) > 3:
-            await asyncio.Event().wait()
-
-    await hand_on(scene(), send)
-    most = MOST_BEHIND if had_scene else LARGEST_MESSAGE
-    assert most < len(taken) * len(piece) < most + 5 * len(piece)
-
-
-async def test_a_browser_gets_all_of_a_scene_in_order():
-    got, pieces = [], [bytes([k]) for k in range(100)]
-
-    async def scene():
-        for piece in pieces:
-            yield piece
-            await asyncio.sleep(0)
-        await until(lambda: len(got) == len(pieces))
+        await until(lambda: got == taken)
 
     async def send(piece):
-        got.append(piece)
+        if len(got) == stops:
+            await asyncio.Event().wait()
+        got.append(piece[0])
 
     await hand_on(scene(), send)
-    assert got == pieces
+    assert got == taken[:stops]
+    assert behind < len(taken) - stops < behind + 5

@@ -1,0 +1,159 @@
+"""Measures the start of the studio, and its scene while a point is dragged; prints JSON.
+
+`python -m tests.studio.measure start`: processor time of the studio's process, also of Python's
+start, to its address, to its page, and to the tensions at the pose in Chromium; of five starts.
+
+`python -m tests.studio.measure drag`: how far the workspace in the scene is behind the hand that
+drags an exit point, by real events of the mouse, without waiting for what is drawn. The place of
+that point, told to the server and drawn, says which event a workspace belongs to. It is seen at the
+second picture of the page after it was drawn. Places without a workspace were overtaken by newer
+ones. Chromium draws by the processor here; a graphics card takes the drawing off it.
+"""
+
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import httpx
+import numpy as np
+from selenium.webdriver import ActionChains
+from selenium.webdriver.common.actions.action_builder import ActionBuilder
+
+from tests.chromium import chromium, complaints, wait_for
+from tests.studio.pictures import DRAWN, POINT
+from tests.studio.run_page import opened, press, text_of
+from tests.studio.served import served
+
+LIVE = text_of(".studio-live")
+
+WATCH = """
+const viewer = document.getElementById('scene').contentWindow.viewer;
+const told = window.dragTold = [], drawn = window.dragDrawn = [];
+let moved = 0, place = null, waiting = [];
+document.getElementById('scene').contentWindow.addEventListener(
+  'pointermove', () => moved = performance.now(), true);
+const emit = window.emitEvent;
+window.emitEvent = (name, ...rest) => {
+  if (name === 'studio_point') told.push({t: performance.now(), moved, at: rest[0].at});
+  emit(name, ...rest);
+};
+const render = viewer.render.bind(viewer);
+viewer.render = (...rest) => {
+  render(...rest);
+  const shown = waiting;
+  waiting = [];
+  requestAnimationFrame(() => requestAnimationFrame(
+    () => shown.forEach((one) => drawn.push({t: performance.now(), ...one}))));
+};
+const handle = viewer.handle_command.bind(viewer);
+viewer.handle_command = (command) => {
+  handle(command);
+  if (command.type === 'set_transform' && command.path === '/drake/studio/exit/1')
+    place = [...command.matrix].slice(12, 15);
+  if (command.type === 'set_object' && command.path === '/drake/studio_workspace' && place)
+    waiting.push({came: performance.now(), at: place});
+};
+"""
+"""Notes the places that are told to the server, and those that workspaces are drawn for."""
+
+PLACE = f"""{POINT}
+const frame = scene.getBoundingClientRect();
+return [Math.trunc(frame.left + x), Math.trunc(frame.top + y)];
+"""
+"""Where the exit point of C2 is in the page [px]."""
+
+DRAGS, STEP, PERIOD = 150, 3, 0.06
+"""Events of the mouse, what it moves between two of them [px], and the time [s]."""
+
+
+def start():
+    """Processor time to each stage of five starts [s], and the page's size."""
+    for _ in range(5):
+        with (
+            tempfile.TemporaryDirectory() as folder,
+            tempfile.TemporaryDirectory() as profile,
+            served(folder) as (address, process),
+            httpx.Client(timeout=120.0) as client,
+            chromium(Path(profile)) as page,
+        ):
+            told = {"to_address_s": processor_time(process.pid)}
+            client.get(address)  # it gives the cookie
+            told["page_kb"] = len(client.get(address.partition("?")[0]).content) / 1e3
+            told["to_page_s"] = processor_time(process.pid)
+            page.get(address)
+            wait_for(page, f"{LIVE}.includes('limits')")
+            told["to_tensions_s"] = processor_time(process.pid)
+            print(json.dumps(told))
+
+
+def processor_time(pid):
+    """Of a process and its threads [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def drag():
+    """From the event of the pointer until a workspace came, and is seen; how long it is refined."""
+    with opened("acrobot_large") as page:
+        press(page, "Robot")
+        wait_for(page, f"{DRAWN} && {LIVE}.includes('limits')")
+        time.sleep(3.0)  # the camera turns to the robot
+        hand = ActionBuilder(page, duration=0)
+        hand.pointer_action.move_to_location(*page.execute_script(PLACE)).pointer_down()
+        hand.perform()
+        move(page, -STEP, 0)
+        wait_for(page, f"{LIVE}.includes('grid')")
+        page.execute_script(WATCH)
+        for k in range(DRAGS):
+            there = -STEP if k // 20 % 2 == 0 else STEP
+            move(page, there, there // STEP)
+            time.sleep(PERIOD)
+        time.sleep(0.4)
+        let_go = time.monotonic()
+        ActionChains(page).release().perform()
+        told, drawn = page.execute_script("return [window.dragTold, window.dragDrawn]")
+        wait_for(page, f"{LIVE}.includes('refined')")
+        pairs = matched(told, drawn)
+        print(json.dumps({
+            "events_told": len(told),
+            "workspaces_drawn": len(pairs),
+            "came_ms": percentiles(one["came"] - event["moved"] for event, one in pairs),
+            "seen_ms": percentiles(one["t"] - event["moved"] for event, one in pairs),
+            "refined_after_letting_go_s": time.monotonic() - let_go,
+            "complaints": complaints(page),
+        }, indent=2))  # fmt: skip
+
+
+def move(page, x, y):
+    """Moves the mouse by so many pixels."""
+    ActionChains(page, duration=0).move_by_offset(x, y).perform()
+
+
+def matched(told, drawn):
+    """Each coarse workspace that was drawn, with the last event before it that told its place.
+
+    The page tells all digits of places, the robot has four.
+    """
+    pairs = []
+    for one in drawn:
+        before = [
+            event
+            for event in told
+            if event["t"] < one["came"] and np.allclose(event["at"], one["at"], rtol=0.0, atol=1e-3)
+        ]
+        # What comes once more for the same event is the refined workspace.
+        if before and (not pairs or pairs[-1][0] is not before[-1]):
+            pairs.append((before[-1], one))
+    return pairs
+
+
+def percentiles(values):
+    """Median and 95 per cent."""
+    return np.percentile(list(values), [50.0, 95.0]).tolist()
+
+
+if __name__ == "__main__":
+    {"start": start, "drag": drag}[sys.argv[1]]()
