@@ -81,12 +81,6 @@ def in_scene(bench, path):
     return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result(60.0)
 
 
-def open_panel(user, name):
-    """Shows another panel."""
-    (tabs,) = {element.parent_slot.parent for element in user.find(marker=f"tab-{name}").elements}
-    tabs.value = name
-
-
 def type_into(user, name, words):
     """Types words into a field, and presses Enter."""
     found = user.find(marker=name)
