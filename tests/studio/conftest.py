@@ -5,18 +5,14 @@ import gc
 import inspect
 import os
 import sys
-from contextlib import redirect_stdout
-from io import StringIO
-from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from cdpr_drake.analyses.logs.replay import replay_log
-from cdpr_drake.cli.app import main
-from tests.studio.pages import HeldPage
+from tests.cli.commands import ended
+from tests.studio.pages import opened_page, until
 from tests.studio.served import served
-
-ROOT = Path(__file__).parents[2]
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
 """Of a short run of acrobot_pbvs."""
@@ -34,9 +30,7 @@ def alone(tmp_path_factory):
     """Folder that the command writes for a short run that nobody looks at."""
     folder = tmp_path_factory.mktemp("alone") / "runs" / "short"
     options = [f"--set={item}" for item in RUN_SETTINGS]
-    with pytest.raises(SystemExit) as end:
-        main(["simulate", "acrobot_pbvs", *options, f"--out={folder}", "--json"])
-    assert end.value.code == 0
+    assert ended("simulate", "acrobot_pbvs", *options, f"--out={folder}") == 0
     return folder
 
 
@@ -44,11 +38,8 @@ def alone(tmp_path_factory):
 def computed(tmp_path_factory):
     """A workspace of two kinds and a measure, as the command leaves it."""
     folder = tmp_path_factory.mktemp("work") / "workspaces" / "small"
-    printed = StringIO()
-    with redirect_stdout(printed), pytest.raises(SystemExit):
-        main(["workspace", "acrobot_small", "--grid", "5,5,5", "--kind", "static,wrench-feasible",
-              "--force", "1", "--measure", "capacity-margin", "--out", str(folder)])  # fmt: skip
-    (folder / "printed.txt").write_text(printed.getvalue())
+    options = "--kind=static,wrench-feasible", "--force=1", "--measure=capacity-margin"
+    ended("workspace", "acrobot_small", "--grid=5,5,5", *options, f"--out={folder}")
     return folder
 
 
@@ -68,22 +59,30 @@ def work(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def held(request, work):
-    """That page, of the module's `ROBOT`."""
-    page = HeldPage(work, request.module.ROBOT)
-    yield page
-    page.close()
+    """That page, of the module's `ROBOT`: who has opened it, its workbench, and what runs tests."""
+    with asyncio.Runner() as runner:
+        page = opened_page(work, request.module.ROBOT)
+        user, bench, _ = runner.run(page.__aenter__())
+        yield SimpleNamespace(user=user, bench=bench, run=runner.run)
+        runner.run(page.__aexit__(None, None, None))
 
 
 @pytest.fixture
-def user(held):
-    """Who has opened it, and is told nothing yet."""
-    held.run(held.begin())
+def user(request, held):
+    """Who has opened it, and is told nothing yet; the robot is as it was in the beginning."""
+
+    async def begin():
+        held.user.notify.messages.clear()
+        held.bench.take_opened(held.bench.files.open(request.module.ROBOT))
+        await until(lambda: held.bench.answer is not None and not held.bench.is_computing)
+
+    held.run(begin())
     return held.user
 
 
 @pytest.fixture
 def bench(held, user):
-    """Its workbench, with the robot as it was in the beginning."""
+    """Its workbench."""
     return held.bench
 
 
@@ -92,11 +91,9 @@ def pytest_pyfunc_call(pyfuncitem):
     """A test that is a coroutine runs in the page that is held, or in a loop of its own."""
     if not inspect.iscoroutinefunction(pyfuncitem.obj):
         return None
-    given = {name: pyfuncitem.funcargs[name] for name in pyfuncitem._fixtureinfo.argnames}
-    run = asyncio.run
-    if "held" in pyfuncitem.fixturenames:
-        run = pyfuncitem._request.getfixturevalue("held").run
-    run(pyfuncitem.obj(**given))
+    fixtures = pyfuncitem.funcargs
+    run = fixtures["held"].run if "held" in fixtures else asyncio.run
+    run(pyfuncitem.obj(**{name: fixtures[name] for name in pyfuncitem._fixtureinfo.argnames}))
     return True
 
 
@@ -111,6 +108,8 @@ def studio(tmp_path_factory):
 READ_IN_LOOP: list[str] = []
 """Files that the package read in the thread of an event loop, and from where."""
 
+DATA = (".yaml", ".yml", ".json", ".csv", ".npz", ".html", ".png", ".svg", ".xml", ".css")
+"""Endings of what is read, not imported."""
 
 HANDLERS = tuple(f"/studio/{name}" for name in ("robot.py", "settings_form", "page",
                 "run.py", "logs", "verb_panel", "views", "plots"))  # fmt: skip
@@ -121,23 +120,13 @@ def _watch(event, arguments):
     if event != "open" or asyncio._get_running_loop() is None:
         return
     path, _, flags = arguments
-    if not isinstance(path, str | bytes) or (flags & (os.O_WRONLY | os.O_RDWR)):
-        return
-    name = os.fsdecode(path)
-    if (
-        name.endswith((".py", ".pyc", ".so", ".js"))
-        or name == sys.argv[0]  # where warnings look for lines
-        or "site-packages" in name
-        or name.startswith(sys.base_prefix)
-    ):  # modules, at their import
+    name = os.fsdecode(path) if isinstance(path, str | bytes) else ""
+    if not name.endswith(DATA) or "site-packages" in name or flags & (os.O_WRONLY | os.O_RDWR):
         return
     frame = sys._getframe(1)
-    while frame is not None and not frame.f_code.co_filename.startswith(str(ROOT)):
-        frame = frame.f_back
     while frame is not None and "/tests/" not in frame.f_code.co_filename:
         if any(part in frame.f_code.co_filename for part in HANDLERS):
             READ_IN_LOOP.append(f"{name} in {frame.f_code.co_filename}:{frame.f_lineno}")
-            return
         frame = frame.f_back
 
 
@@ -146,6 +135,6 @@ sys.addaudithook(_watch)
 
 @pytest.fixture(autouse=True)
 def _no_file_is_read_in_the_event_loop():
-    del READ_IN_LOOP[:]
+    READ_IN_LOOP.clear()
     yield
-    assert sorted(set(READ_IN_LOOP)) == []
+    assert READ_IN_LOOP == []

@@ -1,4 +1,4 @@
-"""Measures the start of the studio, and its scene while a point is dragged; prints JSON.
+"""Measures the start of the studio, its scene while a point is dragged, and plots; prints JSON.
 
 `python -m tests.studio.measure start`: processor time of the studio's process, also of Python's
 start, to its address, to its page, and to the tensions at the pose in Chromium; of five starts.
@@ -8,6 +8,9 @@ drags an exit point, by real events of the mouse, without waiting for what is dr
 that point, told to the server and drawn, says which event a workspace belongs to. It is seen at the
 second picture of the page after it was drawn. Places without a workspace were overtaken by newer
 ones. Chromium draws by the processor here; a graphics card takes the drawing off it.
+
+`python -m tests.studio.measure plots`: frames of plots per second of a run at real time, with the
+scene beside them, and without, and rows that came in eight seconds.
 """
 
 import json
@@ -24,8 +27,8 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
 from tests.chromium import chromium, complaints, wait_for
 from tests.studio.pictures import DRAWN, POINT
-from tests.studio.run_page import opened, press, text_of
-from tests.studio.served import served
+from tests.studio.run_page import FRAMES, opened, press, text_of, write_scenario
+from tests.studio.served import LONGEST_START, served
 
 LIVE = text_of(".studio-live")
 
@@ -150,10 +153,37 @@ def matched(told, drawn):
     return pairs
 
 
+def plots():
+    """Frames of plots with the scene, and without."""
+    endless = {"duration: 30.0": "duration: 300.0", "position: 0.0003": "position: 1.0e-9"}
+    with tempfile.TemporaryDirectory() as folder:
+        scenario = write_scenario(Path(folder), **endless)
+        with opened(str(scenario), folder=folder, size=(1280, 1000)) as page:
+            press(page, "Run")
+            wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
+            press(page, "Start")
+            wait_for(page, f"{FRAMES}[1] > 20", LONGEST_START)
+            told = {"with_scene": rate(page)}
+            page.execute_script("document.querySelector('#scene').remove()")
+            time.sleep(2.0)
+            told |= {"without_scene": rate(page), "complaints": complaints(page)}
+            press(page, "Stop")
+            wait_for(page, f"{text_of('.cdpr-state')} === 'stopped'")
+    print(json.dumps(told, indent=2))
+
+
+def rate(page):
+    """Frames per second of the plots, and rows that came in eight seconds."""
+    frames, rows, start = page.execute_script(f"return {FRAMES}")
+    time.sleep(8.0)
+    last = page.execute_script(f"return {FRAMES}")
+    return {"frames_per_s": (last[0] - frames) / (last[2] - start), "rows": last[1] - rows}
+
+
 def percentiles(values):
     """Median and 95 per cent."""
     return np.percentile(list(values), [50.0, 95.0]).tolist()
 
 
 if __name__ == "__main__":
-    {"start": start, "drag": drag}[sys.argv[1]]()
+    {"start": start, "drag": drag, "plots": plots}[sys.argv[1]]()

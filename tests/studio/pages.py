@@ -48,43 +48,6 @@ async def opened_page(folder, robot="acrobot_large"):
         calculator.shutdown(cancel_futures=True)
 
 
-class HeldPage:
-    """A page that stays open for several tests; what they do is done in the task that opened it."""
-
-    def __init__(self, folder, robot):
-        self._robot, self._loop, self._asked = robot, asyncio.new_event_loop(), asyncio.Queue()
-        self._task = self._loop.create_task(self._hold(folder))
-        self.user = self.bench = None
-
-    def run(self, steps):
-        """Waits for what a coroutine does in the page."""
-        done = self._loop.create_future()
-        self._asked.put_nowait((steps, done))
-        first = asyncio.wait([done, self._task], return_when=asyncio.FIRST_COMPLETED)
-        self._loop.run_until_complete(first)
-        return done.result() if done.done() else self._task.result()  # why it does not open
-
-    def close(self):
-        """Ends it."""
-        self._asked.put_nowait(None)
-        self._loop.run_until_complete(self._task)
-        self._loop.close()
-
-    async def begin(self):
-        """The robot as it was in the beginning, and nothing that was said."""
-        self.user.notify.messages.clear()
-        self.bench.take_opened(self.bench.files.open(self._robot))
-        await until(lambda: self.bench.answer is not None and not self.bench.is_computing)
-
-    async def _hold(self, folder):
-        async with opened_page(folder, self._robot) as (self.user, self.bench, _):
-            while (asked := await self._asked.get()) is not None:
-                try:
-                    asked[1].set_result(await asked[0])
-                except BaseException as problem:
-                    asked[1].set_exception(problem)
-
-
 async def settled(bench):
     """Waits until what was asked last is answered and told."""
     await until(lambda: not bench.is_computing and bench._telling is None)
@@ -116,12 +79,6 @@ def shown(user, name):
 def in_scene(bench, path):
     """Whether the scene has something, once what was drawn before is there."""
     return bench.calculator.submit(lambda: bench.scene().meshcat.HasPath(path)).result(60.0)
-
-
-def open_panel(user, name):
-    """Shows another panel."""
-    (tabs,) = {element.parent_slot.parent for element in user.find(marker=f"tab-{name}").elements}
-    tabs.value = name
 
 
 def unfold(user):

@@ -1,7 +1,6 @@
 """The run panel in Chromium: what tests and measurements do with it."""
 
 import json
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,9 +14,6 @@ FRAMES = """(() => {
     return [Number(data.frames || 0), Number(data.rows || 0), performance.now() / 1000];
 })()"""
 """Frames of plots that were drawn, rows that they have, and the browser's time [s]."""
-
-LONGEST_COMPILATION = 300.0
-"""For the kernels of a run, where none is kept [s]."""
 
 
 def write_scenario(folder, **replaced):
@@ -63,11 +59,3 @@ def press(page, words):
 def text_of(selector):
     """JavaScript for the words of an element; empty where there is none."""
     return f"((document.querySelector('{selector}') || {{}}).innerText || '')"
-
-
-def wait_for_start(page, condition):
-    """As `wait_for`, for what may have to wait for kernels to be compiled."""
-    end = time.monotonic() + LONGEST_COMPILATION
-    while time.monotonic() < end and not page.execute_script(f"return {condition}"):
-        time.sleep(0.2)
-    wait_for(page, condition)

@@ -12,7 +12,6 @@ import csv
 import gc
 import os
 import random
-import statistics
 import sys
 import tempfile
 import threading
@@ -23,6 +22,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpx
+import numpy as np
 
 from cdpr_drake.studio.panel import PANELS
 from tests.chromium import chromium
@@ -50,9 +50,10 @@ for (const kind of ['keydown', 'keyup'])
 TYPE = """
 const field = document.querySelector('input[aria-label="cables 0 exit point x"]');
 field.focus();
-field.value = arguments[0];
+field.value = (-0.4 - 0.1 * Math.random()).toFixed(3);
 field.dispatchEvent(new Event('input', {bubbles: true}));
 field.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter', keyCode: 13, bubbles: true}));
+setTimeout(() => document.querySelector('[aria-label="Undo, Ctrl-Z"]').click(), 300);
 """
 
 CHOOSE = """
@@ -64,6 +65,17 @@ setTimeout(() => {
     items[Math.floor(Math.random() * items.length)]?.click();
 }, 400);
 """
+
+ACTIONS = {
+    "tab": (4.0, "", ""),
+    "slider": (5.0, "Pose", SLIDE),
+    "field and undo": (4.0, "Robot", TYPE),
+    "scenario": (1.0, "Run", CHOOSE),
+    "run": (0.3, "Run", f"{button('Start')}.click()"),
+    "reload": (1.0, "", "location.reload()"),
+    "another tab": (0.5, "", ""),
+}
+"""How often each is done, in which panel (any), and its script."""
 
 
 # In the server's process.
@@ -97,11 +109,8 @@ def held():
 
     from cdpr_drake.studio.session import Workbench
 
-    objects, kinds = gc.get_objects(), Counter()
-    for thing in objects:
-        for kind in (Workbench, Client, Element):
-            if issubclass(type(thing), kind):
-                kinds[kind] += 1
+    objects, classes = gc.get_objects(), (Workbench, Client, Element)
+    kinds = Counter(kind for one in objects for kind in classes if issubclass(type(one), kind))
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return {
         "rss_mb": round(pages * os.sysconf("SC_PAGE_SIZE") / 1e6, 1),
@@ -124,7 +133,7 @@ def request_all(url, seconds, found):
     for number, path in zip(range(REQUESTS), cycle(paths), strict=False):
         try:
             sent = cookies if number % 3 else {}
-            answer = httpx.get(home + path, cookies=sent, timeout=60.0, verify=False)
+            answer = httpx.get(home + path, cookies=sent, timeout=60.0)
             found[f"HTTP {answer.status_code}"] += 1
             cookies = cookies or dict(answer.cookies)
             if path == "/" and answer.status_code == 200 and len(paths) < 12:
@@ -134,50 +143,32 @@ def request_all(url, seconds, found):
         time.sleep(seconds / REQUESTS)
 
 
-def use(page, url, seconds, chance):
+def use(page, url, seconds):
     """Uses a studio in many tabs; how often each action succeeded or failed."""
 
     def open_tab():
         page.switch_to.new_window("tab")
         page.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": STILL})
-        page.get(url.replace(HOSTS[0], chance.choice(HOSTS)))
+        page.get(url.replace(HOSTS[0], random.choice(HOSTS)))
 
-    def replace_tab():
-        page.close()
-        page.switch_to.window(page.window_handles[0])
-        open_tab()
-
-    def click(words):
-        page.execute_script(f"{button(words)}.click()")
-
-    def in_panel(panel, script, *words):
-        click(panel)
-        time.sleep(0.4)
-        page.execute_script(script, *words)
-
-    def field():
-        in_panel("Robot", TYPE, f"{-0.4 - 0.1 * chance.random():.3f}")
-        time.sleep(0.3)
-        click("Undo, Ctrl-Z")
-
-    actions = {
-        "tab": (4.0, lambda: click(chance.choice([panel.title for panel in PANELS.values()]))),
-        "slider": (5.0, lambda: in_panel("Pose", SLIDE)),
-        "field and undo": (4.0, field),
-        "scenario": (1.0, lambda: in_panel("Run", CHOOSE)),
-        "run": (0.3, lambda: in_panel("Run", f"{button('Start')}.click()")),
-        "reload": (1.0, page.refresh),
-        "another tab": (0.5, replace_tab),
-    }
-    found = Counter()
+    random.seed(0)
     for _ in range(TABS):
         open_tab()
-    end = time.monotonic() + seconds
+    found, end = Counter(), time.monotonic() + seconds
+    titles = [panel.title for panel in PANELS.values()]
     while time.monotonic() < end:
-        page.switch_to.window(chance.choice(page.window_handles[1:]))
-        name = chance.choices(list(actions), [weight for weight, _ in actions.values()])[0]
+        page.switch_to.window(random.choice(page.window_handles[1:]))
+        (name,) = random.choices(list(ACTIONS), [often for often, *_ in ACTIONS.values()])
+        _, panel, script = ACTIONS[name]
         try:
-            actions[name][1]()
+            if name == "another tab":
+                page.close()
+                page.switch_to.window(page.window_handles[0])
+                open_tab()
+            else:
+                page.execute_script(f"{button(panel or random.choice(titles))}.click()")
+                time.sleep(0.4)
+                page.execute_script(script)
             found[name] += 1
         except Exception as problem:  # it is not there yet, or the page has gone
             found[f"{name}: {type(problem).__name__}"] += 1
@@ -189,11 +180,8 @@ def verdict(rows):
     """What the second half of the time added, from medians of its first and its last sixth."""
     last = rows[len(rows) // 2 :]
     sixth = max(len(last) // 6, 1)
-    for name in rows[0]:
-        early, late = (
-            statistics.median(float(row[name]) for row in part)
-            for part in (last[:sixth], last[-sixth:])
-        )
+    for name in rows.dtype.names:
+        early, late = np.median(last[name][:sixth]), np.median(last[name][-sixth:])
         yield f"{name:10} {early:12.1f} -> {late:12.1f}  {late - early:+.1f}"
 
 
@@ -202,7 +190,6 @@ def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--minutes", type=float, default=60.0)
     options.add_argument("--csv", type=Path, default=Path("soak.csv"))
-    options.add_argument("--seed", type=int, default=0)
     asked = options.parse_args()
     seconds, found = 60.0 * asked.minutes, Counter()
     os.environ["SOAK_CSV"] = str(asked.csv.resolve())
@@ -216,11 +203,11 @@ def main():
             url = f"http://{HOSTS[0]}:{urlsplit(address).port}/?{urlsplit(address).query}"
             other = threading.Thread(target=request_all, args=(url, seconds, found))
             other.start()
-            found += use(page, url, seconds, random.Random(asked.seed))
+            found += use(page, url, seconds)
             other.join()
             assert process.poll() is None, "the server has ended"
-    with asked.csv.open() as file:
-        print(*verdict(list(csv.DictReader(file))), sep="\n")
+    rows = np.genfromtxt(asked.csv, delimiter=",", names=True)
+    print(*verdict(np.atleast_1d(rows)), sep="\n")
     print(dict(sorted(found.items())))
 
 

@@ -3,8 +3,8 @@
 import json
 
 from tests.chromium import cleared, complaints, wait_for
-from tests.studio.run_page import FRAMES, press, text_of, wait_for_start, write_scenario
-from tests.studio.served import served
+from tests.studio.run_page import FRAMES, press, text_of, write_scenario
+from tests.studio.served import LONGEST_START, served
 
 NEAR = {"position: 0.0003": "position: 0.27", "rotation_deg: 0.5": "rotation_deg: 60.0"}
 """A goal that the run comes to within a second of simulated time."""
@@ -33,7 +33,7 @@ def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
         press(page, "Run")
         wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
         press(page, "Start")
-        wait_for_start(page, f"{FRAMES}[1] > 3")
+        wait_for(page, f"{FRAMES}[1] > 3", LONGEST_START)
         wait_for(page, CAMERA)
         wait_for(page, f"{text_of('.cdpr-outcome')} === 'converged'")
         wait_for(page, f"{text_of('.cdpr-state')} === 'finished'")
@@ -43,7 +43,7 @@ def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
         assert json.loads((done / "summary.json").read_text())["outcome"] == "converged"
         page.execute_script("document.querySelector('.cdpr-run .q-checkbox').click()")
         press(page, "Start")
-        wait_for_start(page, f"{text_of('.cdpr-state')} === 'paused'")
+        wait_for(page, f"{text_of('.cdpr-state')} === 'paused'", LONGEST_START)
         page.refresh()
         wait_for(page, f"{text_of('.cdpr-state')} === 'paused' && {FRAMES}[1] > 0")
     left = json.loads((folder / "runs" / "acrobot_pbvs-2" / "summary.json").read_text())
