@@ -33,8 +33,8 @@ axe.run({exclude: ['.q-icon.text-negative']},
         .map(node => `${rule.id}: ${node.target.join(' ')}: ${node.html.slice(0, 160)}`))),
     problem => done(['axe failed: ' + problem]));
 """
-"""Without what is in frames: Drake's scene is Meshcat's page, not ours. Without Quasar's sign beside
-words that say what is wrong, whose red is dark on dark."""
+"""Without what is in frames: Drake's scene is Meshcat's page, not ours. Without Quasar's sign of a
+field that is refused, dark red on dark, which words stand beside."""
 
 
 @contextmanager
