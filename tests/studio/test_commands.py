@@ -260,13 +260,13 @@ async def test_stop_keeps_what_is_finished_and_it_goes_on_there(folder, monkeypa
     about = {"robot": ROBOT, "digest": "x"}
     first = await start(monkeypatch, board, POLITE, about)
     await ready(first)
+    await until(lambda: board.choices()["some"].asked)
     there = board.shown_entry()
     assert (there.name, there.job) == ("some, running", first)
     with pytest.raises(CdprError, match="it works"):
         await board.go_on(there, VERBS, folder)
     first.stop()
     assert await first.wait(LONGEST)
-    await until(lambda: board.choices()["some"].asked)
     board = Board(JobManager(), folder.root, "studies")  # as when the server was started anew
     await until(board.choices)
     there = board.shown_entry()
