@@ -26,8 +26,7 @@ POLL = 0.1
 
 AXE = """
 const done = arguments[arguments.length - 1];
-axe.run({exclude: ['.q-icon.text-negative']},
-        {resultTypes: ['violations'], iframes: false}).then(found => done(
+axe.run(document, {resultTypes: ['violations'], iframes: false}).then(found => done(
     found.violations.flatMap(rule => rule.nodes
         .filter(node => ['serious', 'critical'].includes(node.impact))
         .map(node => `${rule.id}: ${node.target.join(' ')}: ${node.html.slice(0, 160)}`))),

@@ -12,9 +12,13 @@ import signal
 import sys
 import tempfile
 from dataclasses import replace
+from functools import partial
+from typing import Annotated
 
 import pytest
+from cyclopts import App
 
+from cdpr_drake.analyses.frame.words import words
 from cdpr_drake.cli.call import shown_arguments
 from cdpr_drake.cli.commands import COMMANDS
 from cdpr_drake.cli.studio import NOT_OFFERED, verbs
@@ -23,7 +27,7 @@ from cdpr_drake.studio.boards import Board
 from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager
 from cdpr_drake.studio.runs import RunJob
-from cdpr_drake.studio.verb_form import VerbForm
+from cdpr_drake.studio.verb_form import Verb, VerbForm
 from tests.studio.pages import LONGEST, field, simulated, until
 
 ROBOT = "acrobot_small"
@@ -130,6 +134,33 @@ async def test_inputs_are_those_of_the_declarations_and_say_what_is_refused(fold
         rays.value = "12"
         line = ["workspace", f"--robot={ROBOT}", "--rays=12"]
         assert await forms[-1].words({"robot": ROBOT, "kind": "static"}) == line
+
+
+async def test_an_option_of_a_new_type_has_its_input_and_words_at_once(folder):
+    """Its one entry are the words of its type."""
+
+    def hue(word):
+        return float(word.removeprefix("hue "))
+
+    def verb(*, hue: Annotated[float, words(hue, "a hue, as hue 12", "HUE")] = 0.0):
+        """Does it.
+
+        Args:
+            hue: Hue of it.
+        """
+
+    app, forms = App(), []
+    app.default(verb)
+    arguments = partial(app.assemble_argument_collection, parse_docstring=True)
+    parsed = partial(app.parse_args, exit_on_error=False, print_error=False)
+    new = Verb("new", "", arguments, lambda line: parsed(line[1:]))
+    async with simulated(lambda: forms.append(VerbForm(new, {}, folder, []))) as user:
+        field(user, "new-hue").value = "hue 12"
+        assert field(user, "new-hue").props["hint"] == "Hue of it"
+        assert await forms[0].words({}) == ["new", "--hue=hue 12"]
+        field(user, "new-hue").value = "red"
+        assert await forms[0].words({}) == []
+        assert field(user, "new-hue").error == "--hue: found 'red'; accepted: a hue, as hue 12"
 
 
 # Jobs.
@@ -279,13 +310,13 @@ async def test_stop_keeps_what_is_finished_and_it_goes_on_there(folder, monkeypa
     about = {"robot": ROBOT, "digest": "x"}
     first = await start(monkeypatch, board, POLITE, about)
     await ready(first)
+    await until(lambda: board.choices()["some"].asked)
     there = board.follow()[board.shown]
     assert (there.name, there.job) == ("some, running", first)
     with pytest.raises(CdprError, match="it works"):
         await board.go_on(there, VERBS, folder)
     first.stop()
     assert await first.wait(LONGEST)
-    await until(lambda: board.choices()["some"].asked)
     board = Board(JobManager(), folder.root, "studies")  # as when the server was started anew
     await until(board.choices)
     there = board.follow()[board.shown]
