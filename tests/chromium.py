@@ -32,8 +32,7 @@ axe.run(document, {resultTypes: ['violations'], iframes: false}).then(found => d
         .map(node => `${rule.id}: ${node.target.join(' ')}: ${node.html.slice(0, 160)}`))),
     problem => done(['axe failed: ' + problem]));
 """
-"""Without what is in frames: Drake's scene is Meshcat's page, not ours. Without Quasar's sign of a
-field that is refused, dark red on dark, which words stand beside."""
+"""Without what is in frames: Drake's scene is Meshcat's page, not ours."""
 
 
 @contextmanager
