@@ -152,7 +152,7 @@ def _sealed_meshcat() -> Meshcat:
             meshcat = Meshcat(MeshcatParams(host=_INSIDE, port=port, show_stats_plot=False))
             _end_scenes()
             _scenes[port] = _Scene(
-                weakref.ref(meshcat), MeshcatVisualizer(meshcat), threading.get_ident(), _Seal(port)
+                weakref.ref(meshcat), MeshcatVisualizer(meshcat), _thread(), _Seal(port)
             )
             return meshcat
     raise MeshcatError("host, port: found no port of this machine at which Meshcat can listen")
@@ -223,7 +223,7 @@ class _Scene:
 
     meshcat: weakref.ref[Meshcat]
     share: MeshcatVisualizer
-    thread: int
+    thread: tuple[int, int]
     seal: _Seal
     page: tuple[str, int] | None = None
     """Host and port where browsers look."""
@@ -235,10 +235,15 @@ _scenes: dict[int, _Scene] = {}
 """By the port of their Meshcat."""
 
 
+def _thread() -> tuple[int, int]:
+    """This process and thread: a process that is forked has a Meshcat without its threads."""
+    return os.getpid(), threading.get_ident()
+
+
 def _end_scenes() -> None:
     """Ends those of this thread that nobody has any more."""
     gone = [port for port, scene in list(_scenes.items())
-            if scene.thread == threading.get_ident() and scene.meshcat() is None]  # fmt: skip
+            if scene.thread == _thread() and scene.meshcat() is None]  # fmt: skip
     if gone:
         gc.collect()
     for port in gone:
@@ -256,7 +261,7 @@ def _end_scenes() -> None:
 def _leave_scenes() -> None:
     """Leaves those of other threads to the end of the process, which takes them without Drake."""
     for scene in _scenes.values():
-        if scene.thread != threading.get_ident():
+        if scene.thread != _thread():
             ctypes.pythonapi.Py_IncRef(ctypes.py_object(scene.share))
 
 

@@ -133,7 +133,7 @@ def test_files_of_the_process_are_not_copied(tmp_path):
 
 
 COLLECTED_ELSEWHERE = """
-import gc, threading
+import gc, os, threading
 from pydrake.geometry import MeshcatVisualizer, SceneGraph
 from pydrake.systems.framework import DiagramBuilder
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat, private_door
@@ -166,16 +166,23 @@ thread = threading.Thread(target=lambda: others.append(open_meshcat()))
 thread.start()
 thread.join()
 others.clear()
-print("alive")
+del again
+child = os.fork()
+for _ in range(8):  # these take the place of threads that the child has no more
+    threading.Thread(target=threading.Event().wait, daemon=True).start()
+meshcat = open_meshcat()
+if child:
+    print("alive", os.waitpid(child, 0)[1])
 """
-"""A scene that another thread collects, and one that outlives its own thread, until the end."""
+"""Scenes that another thread collects, that outlive their own thread, until the end, and that a
+forked process has without their threads."""
 
 
 def test_a_scene_may_be_collected_in_any_thread():
     ran = subprocess.run(
         [sys.executable, "-c", COLLECTED_ELSEWHERE], capture_output=True, text=True, check=False
     )
-    assert (ran.returncode, ran.stdout) == (0, "alive\n"), ran.stderr
+    assert (ran.returncode, ran.stdout) == (0, "alive 0\n"), ran.stderr
 
 
 def test_a_scene_that_has_gone_leaves_no_file_open():
