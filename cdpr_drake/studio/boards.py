@@ -7,7 +7,7 @@ import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.schema.json_text import load_json
 from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager, JobState
+from cdpr_drake.studio.results import NOTHING, Subject
 from cdpr_drake.studio.verb_form import Verb
 
 RESULTS = ("results.json", "summary.json")
@@ -45,7 +46,7 @@ class Entry:
         job: The newest job that works in the folder, as long as the server has it.
         asked: Words by which it goes on; empty: nobody knows them, or it is done; None: nobody
             asked for it here.
-        about: Name and digest of the robot that it is about; empty: not known.
+        about: The robot that it is about, as it was when this was asked for.
         files: Names of what is in the folder.
         is_whole: True if all results are there.
         changed: When its numbers were written, in seconds since 1970; 0: there are none.
@@ -55,20 +56,17 @@ class Entry:
     name: str = ""
     job: Job | None = None
     asked: tuple[str, ...] | None = None
-    about: Mapping[str, str] = field(default_factory=dict)
+    about: Subject = NOTHING
     files: frozenset[str] = frozenset()
     is_whole: bool = False
     changed: float = 0.0
 
-    def digest(self, robot: str) -> str:
-        """Digest of the robot of a name, as it was when this was asked for; empty: not known."""
-        return self.about.get("digest", "") if self.about.get("robot") == robot else ""
 
-
-def write_asked(path: Path, words: Sequence[str], about: Mapping[str, str]) -> None:
+def write_asked(path: Path, words: Sequence[str], about: Subject) -> None:
     """Writes by which words a folder beside can go on, none if it is done, and on which robot."""
+    data = {"words": list(words), "robot": about.robot, "digest": about.digest}
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({"words": list(words), **about}), encoding="utf-8")
+    path.write_text(json.dumps(data), encoding="utf-8")
 
 
 def numbers_file(folder: Path) -> Path | None:
@@ -141,25 +139,26 @@ class Board:
 
     def _read(self, folder: Path) -> Entry:
         asked = _asked(self._beside(folder))
-        words = tuple(map(str, asked.pop("words"))) if asked else None
+        words = tuple(map(str, asked["words"])) if asked else None
+        about = Subject(*(str(asked.get(key, "")) for key in ("robot", "digest")))
         name = f"{folder.name}, stopped" if words else folder.name
         file = numbers_file(folder)
         return Entry(
-            folder, name, asked=words, about={key: str(value) for key, value in asked.items()},
-            files=frozenset(path.name for path in folder.glob("*")), is_whole=self.is_whole(folder),
+            folder,
+            name,
+            asked=words,
+            about=about,
+            files=frozenset(path.name for path in folder.glob("*")),
+            is_whole=self.is_whole(folder),
             changed=0.0 if file is None else file.stat().st_mtime,
-        )  # fmt: skip
+        )
 
     def _beside(self, folder: Path) -> Path:
         return self.folder / f".{folder.name}{ASKED}"
 
-    async def start(
-        self, verb: Verb, words: Sequence[str], name: str, about: Mapping[str, str]
-    ) -> Job:
-        """Begins a verb with results in a new folder of a name, and looks at it.
-
-        `words` are those of its form, `about` is name and digest of its robot, if it has one.
-        """
+    async def start(self, verb: Verb, words: Sequence[str], name: str, about: Subject) -> Job:
+        """Begins a verb, by words of its form about a robot, with results in a new folder of a
+        name, and looks at it."""
         folder = self._jobs.free_folder(self.folder / name)
         with suppress(OSError):  # a full disk, say: the command will tell
             await asyncio.to_thread(write_asked, self._beside(folder), words, about)
@@ -178,10 +177,7 @@ class Board:
         await asyncio.to_thread(verb.accept, words, folder)
         return self._submit(entry.folder, verb, words, entry.about)
 
-    def _submit(
-        self, folder: Path, verb: Verb, words: Sequence[str],
-        about: Mapping[str, str],
-    ) -> Job:  # fmt: skip
+    def _submit(self, folder: Path, verb: Verb, words: Sequence[str], about: Subject) -> Job:
         out = [f"--out={folder}"] if verb.writes_folder else []
         job = Job([words[0], *out, "--json", *words[1:]], self._root, folder)
         job.put_away = partial(_put_away, self._beside(folder), about)
@@ -194,7 +190,7 @@ def _is_own(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink() and not path.name.startswith(".")
 
 
-def _put_away(path: Path, about: Mapping[str, str], job: Job) -> None:
+def _put_away(path: Path, about: Subject, job: Job) -> None:
     """Writes a command's answer as the numbers of its folder, where it has written none itself.
 
     The file beside the folder says by which words it can go on, until it is done.

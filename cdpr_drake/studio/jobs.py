@@ -138,7 +138,7 @@ class Job:
 
         SIGKILL ends it at once, with all that it started.
         """
-        if not self.state.is_over and wish != self._wish:  # a second SIGTERM would keep nothing
+        if wish != self._wish:  # a second SIGTERM would keep nothing
             self._wish = wish
             queued = self.state == JobState.QUEUED
             self.set_state(JobState.STOPPED if queued else JobState.STOPPING)

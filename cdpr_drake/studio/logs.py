@@ -79,11 +79,10 @@ def logs_panel(bench: Workbench) -> None:
     chosen = ui.select([], label="log in the working folder", with_input=True)
     chosen.classes("w-full").mark("log")
     contents = ui.element("div").classes("w-full").mark("log-contents")
-    panel = VerbPanel(logs)
+    VerbPanel(logs)
 
     async def choose() -> None:
         name = logs.log = str(chosen.value or "")
-        panel.start.set_enabled(bool(name))
         with contents.clear(), show_errors():
             if not name:
                 return
@@ -98,7 +97,6 @@ def logs_panel(bench: Workbench) -> None:
         if files is not None and files != chosen.options:
             chosen.set_options(files, value=logs.log or None)
 
-    panel.start.set_enabled(False)
     chosen.on_value_change(choose)
     ui.timer(TICK, follow)
 

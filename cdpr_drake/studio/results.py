@@ -64,6 +64,10 @@ class Subject:
         return self.robot != now.robot or bool(self.digest and self.digest != now.digest)
 
 
+NOTHING = Subject("")
+"""Of what is not known to be about any robot."""
+
+
 def subject_of(robot: Robot) -> Subject:
     """What a result about a robot is about."""
 

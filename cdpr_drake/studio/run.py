@@ -23,6 +23,7 @@ from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
 from cdpr_drake.studio.runs import (
     NO_RUN,
+    READING,
     SPEEDS,
     FinishedRun,
     RunBoard,
@@ -48,8 +49,6 @@ a graphics card the scene takes most of its time."""
 
 SPANS = {"all": None, "last 5 s": 5.0, "last 20 s": 20.0}
 """Times that plots show."""
-
-READING = "reading the log"
 
 EMPTY = (
     "No run is shown. Choose a scenario and press Start to simulate the open robot, or choose one "

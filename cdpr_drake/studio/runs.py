@@ -35,6 +35,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.models.robot_schema import Robot
 from cdpr_drake.palette import nth_look
 from cdpr_drake.schema.json_text import load_json
+from cdpr_drake.schema.typed_yaml import plain_value
 from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.plots import Chart, charts_of
@@ -307,8 +308,8 @@ class RunBoard(Board):
         self.in_scene: Sample | None = None
         self._reads, self._unreadable = False, set[Path]()  # folders
         self._draws, self._drawn = False, 0.0
-        # Of the calculator's thread: the robot of a scenario, and if the scene shows it.
-        self._scenario: Any = None
+        # Of the calculator's thread: whose pictures there are, and if the scene shows them.
+        self._about: tuple[Subject | None, dict[str, Any]] = None, {}
         self._is_drawn = False
         self._picture: RobotPicture
 
@@ -415,7 +416,7 @@ class RunBoard(Board):
             if future.exception() is None and self.in_scene is not None:
                 bench.draws(shown.subject)
 
-        bench.draw(lambda scene: self._draw(scene, shown.scenario, sample, dark), done)
+        bench.draw(lambda scene: self._draw(scene, shown, sample, dark), done)
 
     def give_back(self) -> None:
         """Lets the open robot be shown again."""
@@ -429,13 +430,17 @@ class RunBoard(Board):
         self._is_drawn = False
         scene.redraw()
 
-    def _draw(self, scene: RobotScene, scenario: Any, sample: Sample, dark: bool) -> None:
-        if scenario is not self._scenario or not self._is_drawn:
+    def _draw(
+        self, scene: RobotScene, shown: RunJob | FinishedRun, sample: Sample, dark: bool
+    ) -> None:
+        scenario = shown.scenario
+        about = shown.subject, plain_value(scenario) | {"robot": ""}  # a file of each folder
+        if about != self._about or not self._is_drawn:
             for path in PATHS:
                 scene.meshcat.Delete(path)
             robot = load_robot(scenario.robot)
-            if scenario is not self._scenario:  # pydrake frees no diagram
-                self._scenario, self._picture = scenario, _picture(scene.meshcat, robot, scenario)
+            if about != self._about:  # pydrake frees no diagram
+                self._about, self._picture = about, _picture(scene.meshcat, robot, scenario)
             else:
                 self._picture.show()
             look_at_robot(scene.meshcat, robot)

@@ -17,7 +17,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import Board, Entry
 from cdpr_drake.studio.jobs import Job, JobState
 from cdpr_drake.studio.panel import ANSWER, STUDY, notify, offer, robot_argument, show_errors
-from cdpr_drake.studio.results import Subject
+from cdpr_drake.studio.results import NOTHING, Subject
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.verb_form import Filled, VerbForm
 from cdpr_drake.studio.views import View, place_figure, read_behind, read_numbers
@@ -87,8 +87,9 @@ class VerbPanel:
             choice = ui.select(titles, value=verbs.verb, label="what", with_input=not verbs.names)
             choice.classes("col").mark(f"verb-{mark}")
             choice.set_visibility(len(titles) > 1)
-            self.start = ui.button(verbs.start, icon="play_circle", on_click=self._start)
-            self.start.props("no-caps").mark(f"start-{mark}")
+            start = ui.button(verbs.start, icon="play_circle", on_click=self._start)
+            start.props("no-caps").mark(f"start-{mark}")
+            start.bind_enabled_from(self, "_form", lambda form: form is not None)
         self._fields = ui.element("div").classes("w-full")
         with ui.row().classes("w-full items-center no-wrap"):
             self._choice = ui.select({}, label="results", on_change=self._choose)
@@ -123,14 +124,12 @@ class VerbPanel:
                 )  # fmt: skip
 
     async def _start(self) -> None:
-        if self._form is None:
-            return
-        verb, given, about = self._form.verb, self._verbs.given(), {}
+        assert self._form is not None
+        verb, given, about = self._form.verb, self._verbs.given(), NOTHING
         names = [_stem(value) for value in given.values()]
         if verb.needs_robot:
-            given["robot"], now = robot_argument(self._bench), self._bench.subject
-            about = {"robot": now.robot, "digest": now.digest}
-            names.append(now.robot)
+            given["robot"], about = robot_argument(self._bench), self._bench.questions.subject
+            names.append(about.robot)
         if words := await self._form.words(given):
             if len(self._verbs.names) != 1:
                 names.append(verb.title)
@@ -212,8 +211,8 @@ class VerbPanel:
                     if read is not None:
                         self._verbs.place(read)
                 view.place(self._verbs.unfolded)
-                robot = view.robot or entry.about.get("robot", "")
-                results.show(name, Subject(robot, entry.digest(robot)))
+                is_known = view.robot in ("", entry.about.robot)
+                results.show(name, entry.about if is_known else Subject(view.robot))
 
 
 def _stem(word: str) -> str:

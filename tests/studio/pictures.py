@@ -92,7 +92,7 @@ def fill(folder):
     study.mkdir(parents=True)
     said = {"words": "methods agree", "printed": "1", "found": "1", "verdict": "confirmed"}
     (study / "results.json").write_text(json.dumps({"study": "x", "statements": [said]}))
-    about = {"robot": "acrobot_small", "digest": subject_of(load_robot("acrobot_small")).digest}
+    about = subject_of(load_robot("acrobot_small"))
     write_asked(folder / "logs" / f".acrobot_pbvs{ASKED}", (), about)
 
 

@@ -122,6 +122,7 @@ def held():
 def request_all(url, seconds, found):
     """Plain requests to all of a server's addresses, with a cookie and without."""
     home, _, query = url.partition("/?")
+    start = time.monotonic()
     paths = ["/", "/scene/", "/scene/meshcat.js", "/favicon.ico", "/nothing", f"/?{query}",
              "/_nicegui_ws/socket.io/?EIO=4&transport=polling"]  # fmt: skip
     cookies = {}
@@ -135,7 +136,7 @@ def request_all(url, seconds, found):
                 paths += [x.partition('"')[0] for x in answer.text.split('="')[1:] if x[0] == "/"]
         except httpx.HTTPError as problem:
             found[type(problem).__name__] += 1
-        time.sleep(seconds / REQUESTS)
+        time.sleep(max(start + number * seconds / REQUESTS - time.monotonic(), 0.0))
 
 
 def use(page, url, seconds):

@@ -26,6 +26,7 @@ from cdpr_drake.errors import CdprError
 from cdpr_drake.studio.boards import Board
 from cdpr_drake.studio.files import WorkingFolder
 from cdpr_drake.studio.jobs import Job, JobManager
+from cdpr_drake.studio.results import NOTHING, Subject
 from cdpr_drake.studio.runs import RunJob
 from cdpr_drake.studio.verb_form import Verb, VerbForm
 from tests.studio.pages import LONGEST, field, simulated, until
@@ -307,7 +308,7 @@ async def start(monkeypatch, board, code, about):
 
 
 async def test_stop_keeps_what_is_finished_and_it_goes_on_there(folder, monkeypatch, board):
-    about = {"robot": ROBOT, "digest": "x"}
+    about = Subject(ROBOT, "x")
     first = await start(monkeypatch, board, POLITE, about)
     await ready(first)
     await until(lambda: board.choices()["some"].asked)
@@ -321,7 +322,7 @@ async def test_stop_keeps_what_is_finished_and_it_goes_on_there(folder, monkeypa
     await until(board.choices)
     there = board.follow()[board.shown]
     assert (there.name, there.job, there.is_whole) == ("some, stopped", None, False)
-    assert (there.digest(ROBOT), there.digest("planar")) == ("x", "")
+    assert there.about == about
     second = await board.go_on(there, VERBS, folder)
     assert await second.wait(LONGEST)
     assert (second.state, second.arguments) == ("finished", first.arguments)
@@ -331,9 +332,9 @@ async def test_stop_keeps_what_is_finished_and_it_goes_on_there(folder, monkeypa
 
 
 async def test_own_numbers_stay_and_what_leaves_no_folder_leaves_nothing(monkeypatch, board):
-    own = await start(monkeypatch, board, OWN, {})
+    own = await start(monkeypatch, board, OWN, NOTHING)
     assert await own.wait(LONGEST)
-    nothing = await start(monkeypatch, board, "raise SystemExit(2)", {})
+    nothing = await start(monkeypatch, board, "raise SystemExit(2)", NOTHING)
     assert await nothing.wait(LONGEST)
     asked = board.folder / ".some.asked.json"
     await until(lambda: json.loads(asked.read_text())["words"] == [])

@@ -63,7 +63,7 @@ def work(tmp_path_factory, computed, alone, beside):
         (alone, "runs/broken"), (beside, "logs/small"),
     ):  # fmt: skip
         shutil.copytree(source, folder / place)
-    about = {"robot": ROBOT, "digest": subject_of(load_robot(ROBOT)).digest}
+    about = subject_of(load_robot(ROBOT))
     for name in ("workspaces", "logs"):
         write_asked(folder / name / ".small.asked.json", (), about)
     for name, words in (
@@ -346,6 +346,8 @@ async def test_the_scene_has_a_run_once_for_all_tabs_while_its_panel_is_shown(
         await do(user, "outcome: timeout")
         await asyncio.sleep(1.0)
     assert len(drawn) == 1
+    await do(user, "run=second", "run-results:")  # of the same robot in the same scenario
+    await until(lambda: len(drawn) == 2)
     await do(user, "tab-robot")
     await until(lambda: bench.drawn is None)
     assert built == []  # both robots were, once
