@@ -140,7 +140,7 @@ class Board:
     def _read(self, folder: Path) -> Entry:
         asked = _asked(self._beside(folder))
         words = tuple(map(str, asked["words"])) if asked else None
-        about = Subject(*(str(asked.get(key, "")) for key in ("robot", "digest")))
+        about = Subject(str(asked.get("robot", "")), str(asked.get("digest", "")))
         name = f"{folder.name}, stopped" if words else folder.name
         file = numbers_file(folder)
         return Entry(
