@@ -50,16 +50,13 @@ const x = box.left + (p.x + 1) / 2 * box.width, y = box.top + (1 - p.y) / 2 * bo
 """
 """Where the exit point of C2 is in the scene's frame [px]."""
 
-CHOOSE = """
+UNCHOSEN = """
 const of = (e) => e.querySelector('.q-field__label')?.innerText;
-const field = [...document.querySelectorAll('.q-tab-panel .q-select')].find(
+return [...document.querySelectorAll('.q-tab-panel .q-select')].find(
     e => ['results', 'run'].includes(of(e)) && !e.querySelector('.q-field__native').innerText &&
-        !e.querySelector('input')?.value);
-if (!field) return;
-field.querySelector('.q-field__append').click();
-setTimeout(() => document.querySelector('.q-menu .q-item')?.click(), 800);
+        !e.querySelector('input')?.value)?.querySelector('.q-field__append');
 """
-"""Shows a result in a tab that shows none."""
+"""What unfolds the list of results in a tab that shows none."""
 
 LONG = "return Math.max(document.querySelector('.q-tab-panel').scrollHeight + 60, \
 innerWidth < 500 ? document.documentElement.scrollHeight : 0)"
@@ -109,8 +106,11 @@ def photograph(page, size, dark, folder):
     for panel in PANELS.values():
         press(page, panel.title)
         keep(panel.title)
-        page.execute_script(CHOOSE)
-        time.sleep(4.0)
+        if unfold := page.execute_script(UNCHOSEN):
+            unfold.click()
+            wait_for(page, "document.querySelector('.q-menu .q-item') !== null")
+            page.find_element("css selector", ".q-menu .q-item").click()
+            time.sleep(4.0)
         look(page, size, dark, page.execute_script(LONG))
         keep(f"{panel.title}_whole")
         look(page, size, dark)

@@ -456,6 +456,8 @@ async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, b
     await do(user, "tab-logs", "logs-empty:")
     logs = [f"runs/{name}/log.csv" for name in ("broken", "first", "second")]
     assert field(user, "log").options == ["notes.txt", "wrong.csv", *logs]
+    await do(user, "start-logs")
+    await until(lambda: "LOG: found nothing" in str(user.notify.messages))
     await do(user, "log=notes.txt")
     await until(lambda: "notes.txt" in str(user.notify.messages))
     columns = [f"table-columns: >{name}<" for name in import_log(work / "wrong.csv").frame]
