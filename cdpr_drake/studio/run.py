@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -33,7 +34,7 @@ from cdpr_drake.studio.runs import (
 )
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
-from cdpr_drake.studio.views import leaves, send_file, show_results
+from cdpr_drake.studio.views import leaves, read_behind, send_file, show_results
 from cdpr_drake.systems.scenarios.files import robot_scenario_names
 from cdpr_drake.systems.scenarios.visual_servo_scenario import DEFAULT_SCENARIO
 
@@ -89,6 +90,7 @@ class RunPanel:
         """Places it into the current slot."""
         self._bench, self._board = bench, bench.kept(RunBoard)
         self._form: ScenarioForm | None = None
+        self._placing = asyncio.Lock()
         # What the browser has.
         self._shown: object = None
         self._begun: tuple[object, tuple[Chart, ...], object] = NO_RUN, (), None
@@ -119,7 +121,6 @@ class RunPanel:
             self._by_hand.props('title="Cables can be broken and the platform pushed"')
             self._start_button = ui.button("Start", icon="play_circle", on_click=self._start)
             self._start_button.props("no-caps").mark("start")
-            self._start_button.bind_enabled_from(self, "_form", lambda form: form is not None)
         with ui.row().classes("w-full items-center no-wrap"):
             self._which = ui.label().classes("studio-soft").mark("run-robot")
             self._own = ui.button(on_click=self._open_own_robot).mark("open-own-robot")
@@ -267,23 +268,21 @@ class RunPanel:
 
     async def _choose_scenario(self) -> None:
         """Shows the form of another scenario; changes of the same one are kept."""
-        name, self._form = self._scenario.value, None
+        name = self._scenario.value
 
         def read() -> ScenarioDraft:
             folder, draft = self._bench.folder, self._board.draft
             file = str(folder.path(name)) if Path(name).is_absolute() else name
             return draft if draft and draft.name == file else ScenarioDraft(file, folder.root)
 
-        self._body.clear()
-        with self._body:
-            spinner = ui.spinner(size="lg")
-            with show_errors():
-                draft = await run.io_bound(read)
+        async with self._placing:
+            self._form = None
+            self._body.clear()
+            with self._body, show_errors():
+                draft = await read_behind(read)
                 if draft is not None and name == self._scenario.value:  # not changed meanwhile
-                    self._board.draft, form = draft, ScenarioForm(draft)
+                    self._board.draft, self._form = draft, ScenarioForm(draft)
                     await self._take_robot()
-                    self._form = form
-            spinner.delete()
 
     async def _take_robot(self) -> bool:
         """Lets the next run be of the open robot, and says so; returns False if it cannot be."""
@@ -311,7 +310,11 @@ class RunPanel:
     async def _start(self) -> None:
         self._start_button.props("loading")
         with show_errors():
-            if self._form is not None and await self._form.check():
+            async with self._placing:  # it may be on its way
+                form = self._form
+            if form is None:
+                raise CdprError("there is no scenario to start; choose one that can be read")
+            if await form.check():
                 if not await self._take_robot():
                     raise CdprError(self._which.text)
                 await self._board.simulate(paused=self._paused.value, by_hand=self._by_hand.value)

@@ -5,6 +5,7 @@ The panels Workspace, Logs, Studies and Commands are such; the latter two are he
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -79,6 +80,7 @@ class VerbPanel:
         """Places it into the current slot."""
         self._verbs, self._bench, self._board = verbs, verbs.bench, verbs.board
         self._form: VerbForm | None = None
+        self._placing = asyncio.Lock()
         self._job: Job | None = None
         self._shown: tuple[Path | None, float] = None, 0.0
         commands, mark = self._bench.commands, verbs.folder
@@ -89,7 +91,6 @@ class VerbPanel:
             choice.set_visibility(len(titles) > 1)
             start = ui.button(verbs.start, icon="play_circle", on_click=self._start)
             start.props("no-caps").mark(f"start-{mark}")
-            start.bind_enabled_from(self, "_form", lambda form: form is not None)
         self._fields = ui.element("div").classes("w-full")
         with ui.row().classes("w-full items-center no-wrap"):
             self._choice = ui.select({}, label="results", on_change=self._choose)
@@ -112,25 +113,30 @@ class VerbPanel:
         if not name:
             return
         verbs, folder = self._verbs, self._bench.folder
-        verbs.verb, self._form, verb = name, None, self._bench.commands[name]
-        self._fields.clear()
-        with self._fields, show_errors():
-            read = await read_behind(lambda: (verb.options, folder.files((".yaml", ".yml"))))
-            if read is not None:
-                without = [*verbs.given(), *(["robot"] if verb.needs_robot else [])]
-                self._form = VerbForm(
-                    verb, verbs.filled, folder, read[1],
-                    first=verbs.first.get(name, ()), without=without,
-                )  # fmt: skip
+        verbs.verb, verb = name, self._bench.commands[name]
+        async with self._placing:
+            self._form = None
+            self._fields.clear()
+            with self._fields, show_errors():
+                read = await read_behind(lambda: (verb.options, folder.files((".yaml", ".yml"))))
+                if read is not None:
+                    without = [*verbs.given(), *(["robot"] if verb.needs_robot else [])]
+                    self._form = VerbForm(
+                        verb, verbs.filled, folder, read[1],
+                        first=verbs.first.get(name, ()), without=without,
+                    )  # fmt: skip
 
     async def _start(self) -> None:
-        assert self._form is not None
-        verb, given, about = self._form.verb, self._verbs.given(), NOTHING
+        async with self._placing:  # it may be on its way
+            form = self._form
+        if form is None:
+            raise CdprError("there is no form; choose what to start")
+        verb, given, about = form.verb, self._verbs.given(), NOTHING
         names = [_stem(value) for value in given.values()]
         if verb.needs_robot:
             given["robot"], about = robot_argument(self._bench), self._bench.questions.subject
             names.append(about.robot)
-        if words := await self._form.words(given):
+        if words := await form.words(given):
             if len(self._verbs.names) != 1:
                 names.append(verb.title)
             name = "-".join(names) or _stem(words[-1])

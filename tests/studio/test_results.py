@@ -31,7 +31,9 @@ from cdpr_drake.studio.views import View, read_numbers
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.cli.commands import ended
 from tests.studio.conftest import RUN_SETTINGS
-from tests.studio.pages import LONGEST, another_tab, archive, do, field, in_scene, put, until
+from tests.studio.pages import (
+    LONGEST, another_tab, archive, do, field, in_scene, put, settled, until,
+)  # fmt: skip
 from tests.studio.run_page import write_scenario
 
 ROBOT, OTHER = "acrobot_small", "planar"
@@ -339,6 +341,8 @@ async def test_the_scene_has_a_run_once_for_all_tabs_while_its_panel_is_shown(
     await until(lambda: bench.drawn is None)
     assert bench.kept(runs.RunBoard).in_scene is None
     field(user, "cursor").value = 0.1  # as another tab moves it
+    await settled(bench)
+    assert in_scene(bench, "visualizer")
     del drawn[:], built[:]
     await do(user, "tab-run")
     await until(lambda: bench.drawn is not None)
