@@ -31,9 +31,7 @@ from cdpr_drake.studio.views import View, read_numbers
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.cli.commands import ended
 from tests.studio.conftest import RUN_SETTINGS
-from tests.studio.pages import (
-    LONGEST, another_tab, archive, do, field, in_scene, put, settled, until,
-)  # fmt: skip
+from tests.studio.pages import LONGEST, another_tab, archive, do, field, in_scene, put, until
 from tests.studio.run_page import write_scenario
 
 ROBOT, OTHER = "acrobot_small", "planar"
@@ -341,7 +339,7 @@ async def test_the_scene_has_a_run_once_for_all_tabs_while_its_panel_is_shown(
     await until(lambda: bench.drawn is None)
     assert bench.kept(runs.RunBoard).in_scene is None
     field(user, "cursor").value = 0.1  # as another tab moves it
-    await settled(bench)
+    await until(lambda: not bench.is_computing)
     assert in_scene(bench, "visualizer")
     del drawn[:], built[:]
     await do(user, "tab-run")
@@ -498,8 +496,8 @@ async def test_a_wrong_value_starts_nothing_and_a_run_fails_or_is_found_again(
 
 
 async def test_buttons_break_and_push_and_the_scenario_keeps_it(user, bench, work):
-    await do(user, "tab-run", f"scenario={work / 'acrobot_pbvs.yaml'}", "field-duration: 0.5")
-    await do(user, "paused", "by-hand", "start", "hand-cable: C3")
+    await do(user, "tab-run", "paused", "by-hand", f"scenario={work / 'acrobot_pbvs.yaml'}")
+    await do(user, "start", "hand-cable: C3")  # at once, while the form is on its way
     field(user, "hand-cable").value = 2
     await do(user, "break", "hand-done: C3 breaks")
     await until(lambda: 2 not in field(user, "hand-cable").options)
@@ -512,6 +510,7 @@ async def test_buttons_break_and_push_and_the_scenario_keeps_it(user, bench, wor
     assert await job.wait(LONGEST)
     await until(lambda: not field(user, "break").enabled)
     scenario = load_scenario(str(job.folder / "scenario.yaml"))
+    assert scenario.duration == 0.5
     (event,) = scenario.failures.events
     assert (event.kind, event.cable) == ("cable_breaks", 2)
     assert scenario.disturbances.pushes[-1].force.tolist() == [0.0, -4.0, 0.0]
