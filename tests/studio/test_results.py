@@ -464,7 +464,7 @@ async def test_a_log_is_compared_with_the_open_robot_as_the_command_does(user, b
     await until(lambda: "notes.txt" in str(user.notify.messages))
     columns = [f"table-columns: >{name}<" for name in import_log(work / "wrong.csv").frame]
     await do(user, "log=wrong.csv", "table-Numbers: rows gaps</th><td>1<", *columns)
-    await do(user, "shown-figure: image/png", "start-logs")
+    await do(user, "shown-figure: image/png", "start-logs", "logs-state: finished")
     await until(lambda: bench.results.subject("log") == bench.questions.subject)
     offset, right = (
         json.loads((folder / "summary.json").read_text())["cables"]["C1"]["length_offset_m"]
