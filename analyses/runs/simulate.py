@@ -111,7 +111,7 @@ def simulate(
     loaded = scenario_with(
         scenario, overrides, camera=camera, duration=duration, seed=seed, log_rate=log_rate
     )
-    loaded, note = set_loop(loaded, False, meshcat)
+    loaded, note = set_loop(loaded, False, meshcat or steered_by is not None)
     run = KINDS[loaded.kind](loaded)
     run.chosen_end = duration is not None
     _check_options(run, video, meshcat, host or port, steered_by)
@@ -125,7 +125,7 @@ def simulate(
     base, arguments = f"runs/{loaded.name}", run.arguments() | {"steered": follow.acts}
     if follow.connect is not None and folder is None and follow.results is not None:
         folder = free_folder(follow.results.parent / base, {})  # no such run goes on
-    seen = meshcat or follow.acts or follow.connect is not None
+    seen = follow.prepare is not None or follow.connect is not None
     again = folder is not None and not seen
     with results_folder(base, arguments, folder, overwrite, follow.results, again) as results:
         say_remarks(note, warnings, follow)

@@ -93,7 +93,8 @@ def steered(follow: Follow, scenario: Any, descriptor: int) -> Follow:
             f"steered_by: found {descriptor}; accepted: the number of an open socket"
         ) from problem
     steering = Steering(scenario, connection, follow.stop)
-    return replace(follow, prepare=steering.prepare, stop=steering.stop, acts=True)
+    acts = bool(steering.hands.takes)
+    return replace(follow, prepare=steering.prepare, stop=steering.stop, acts=acts)
 
 
 def check_steered(scenario: Any) -> None:
@@ -169,7 +170,11 @@ def receive(connection: Connection) -> Message:
 
 
 class Steering:
-    """The run's end of the connection: it shows the run, and does what the other end asks for."""
+    """The run's end of the connection: it shows the run, and does what the other end asks for.
+
+    Attributes:
+        hands: What is done by hand.
+    """
 
     def __init__(
         self, scenario: Any, connection: Connection, stop: Callable[[], bool] = lambda: False
@@ -183,11 +188,11 @@ class Steering:
         """
         self._connection, self._stop_of_others = connection, stop
         self._pace, self._samples = Pace(), Samples(scenario)
-        self._hands, self._period = ByHand(scenario), 1.0 / scenario.log_rate
+        self.hands, self._period = ByHand(scenario), 1.0 / scenario.log_rate
         self._sample_due = self._image_due = self._listen_due = 0.0
         self._reported: tuple[bool, float | None] | None = None
         self._connected, self._stopped = True, False
-        begin = {**self._samples.header(), "takes": list(self._hands.takes)}
+        begin = {**self._samples.header(), "takes": list(self.hands.takes)}
         self._send(Message("begin", begin), always=True)
 
     def stop(self) -> bool:
@@ -196,7 +201,7 @@ class Steering:
 
     def prepare(self, run: Any, simulator: Simulator, diagram: Diagram) -> None:
         """Looks at a run from now on, see `Follow.prepare`."""
-        self._hands.prepare(diagram)
+        self.hands.prepare(diagram)
         simulator.set_monitor(lambda context: self._look(diagram, context))
 
     def _look(self, diagram: Diagram, context: Context) -> EventStatus:
@@ -295,7 +300,7 @@ class Steering:
             self._end()
         elif what in UNTOUCHED:
             try:
-                event = self._hands.do(data, now)
+                event = self.hands.do(data, now)
             except ScenarioError as problem:
                 event = {"t": now, "refused": str(problem)}
             self._send(Message("event", event), always=True)

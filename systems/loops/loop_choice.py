@@ -117,7 +117,7 @@ def set_loop(
     Args:
         scenario: A scenario of any kind.
         repeated: Whether it is one of many runs.
-        watched: Whether Meshcat shows it, which looks into a diagram.
+        watched: Whether Meshcat or the studio shows it, which look into a diagram.
 
     Raises:
         ScenarioError: It asks for the loop, which cannot do it.
@@ -132,7 +132,7 @@ def set_loop(
     why = many_steps_reason(asked, repeated)
     if not why or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
         return chosen, words  # type: ignore[return-value]
-    reason = "Meshcat looks into one" if watched else diagram_reason(chosen)
+    reason = "who watches looks into one" if watched else diagram_reason(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
     other = "with overrides integration.loop=diagram"

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 from cdpr_drake.analyses.logs.import_log import import_log
+from cdpr_drake.analyses.runs.log import CHECKPOINT, PARTS
 from cdpr_drake.analyses.runs.steering import Message
 from cdpr_drake.analyses.visualization.meshcat_window import open_meshcat
 from cdpr_drake.analyses.visualization.replay import RecordedScene
@@ -21,6 +22,7 @@ from cdpr_drake.models.robot_loader import load_robot
 from cdpr_drake.palette import TENSIONS, rgb
 from cdpr_drake.studio import runs, workspace
 from cdpr_drake.studio.boards import write_asked
+from cdpr_drake.studio.jobs import Job
 from cdpr_drake.studio.logs import Logs, read_comparison
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.plots import plot_row
@@ -95,7 +97,9 @@ def test_samples_are_thinned_evenly_and_the_newest_is_there(tmp_path, monkeypatc
     assert [sample["t"] for sample in job.samples] == [0, 16, 32, 48, 64, 80, 96, 99]
 
 
-async def test_a_run_that_is_watched_paused_and_stepped_has_the_same_log(tmp_path, alone):
+async def test_a_run_that_is_watched_and_stopped_goes_on_by_the_command_with_the_same_log(
+    tmp_path, alone
+):
     job = RunJob("acrobot_pbvs", tmp_path, tmp_path / "out", settings=RUN_SETTINGS)
     job.tell("pause")
     job.begin()
@@ -107,8 +111,14 @@ async def test_a_run_that_is_watched_paused_and_stepped_has_the_same_log(tmp_pat
     await until(lambda: job.progress[0] == pytest.approx(job.samples[-1]["t"] / 0.2))
     await until(lambda: job.at(None)[1].startswith(JPEG))
     assert job.samples[-1]["t"] == row  # it stands
-    job.tell("speed", factor=1.0)
-    job.tell("go")
+    job.stop()
+    assert await job.wait(LONGEST)
+    assert job.message.endswith("the same command goes on")
+    assert (job.folder / PARTS / CHECKPOINT).is_file()
+    settings = [f"--set={item}" for item in RUN_SETTINGS]
+    job = Job(["simulate", "acrobot_pbvs", *settings, f"--out={job.folder}", "--json"],
+              tmp_path, job.folder)  # fmt: skip
+    job.begin()
     assert await job.wait(LONGEST)
     assert job.state == "finished", job.message
     assert {path.name for path in job.folder.iterdir()} == {path.name for path in alone.iterdir()}
