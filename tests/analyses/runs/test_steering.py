@@ -1,6 +1,7 @@
 """Runs that are steered: pace, messages, what is done by hand; whole ones are in tests/studio."""
 
 import math
+import os
 from multiprocessing import Pipe
 
 import cv2
@@ -11,6 +12,7 @@ from cdpr_drake.analyses.frame.folder import Folder
 from cdpr_drake.analyses.frame.follow import NOBODY, Follow
 from cdpr_drake.analyses.runs.samples import MarksPicture
 from cdpr_drake.analyses.runs.servo import ServoRun
+from cdpr_drake.analyses.runs.simulate import simulate
 from cdpr_drake.analyses.runs.steering import (
     BREAK,
     FASTEST_SPEED,
@@ -209,3 +211,16 @@ def test_a_run_that_was_acted_on_never_goes_on_from_the_middle(tmp_path):
         assert not list(folder.path.glob("log.parts/*.npz"))
         with pytest.raises(OutputFolderError, match="which cannot go on; accepted: cdpr finish"):
             run.simulate(folder.path, acts)
+
+
+def test_a_run_that_is_long_enough_for_the_compiled_loop_is_steered(tmp_path):
+    ours, theirs = Pipe()
+    with ours:
+        send(ours, Message("do", {"what": "stop"}))
+        run = simulate(
+            "acrobot_pbvs", SETTINGS, folder=tmp_path / "out", duration=700.0,
+            steered_by=os.dup(theirs.fileno()),
+        )  # fmt: skip
+        assert receive(ours).data["takes"] == []
+    assert (run.stopped, run.scenario.integration.loop) == (True, "automatic")
+    theirs.close()
