@@ -115,26 +115,3 @@ def line_force(
     out[:] = 0.0
     _, _, _, fx, _, _ = _platform_force(line_motion(state), l0, l0_dot, cables)
     out[start] = fx
-
-
-@njit(cache=True)
-def _cable_states(X: Motion, l0: Array, l0_dot: Array, cables: Array, out: Array) -> None:
-    for i in range(cables.shape[0]):
-        t, length, _, _, _, _, _, _ = cable_pull(X, cables[i], l0[i], l0_dot[i])
-        out[0, i] = t
-        out[1, i] = length
-        out[2, i] = 1.0 if t == 0.0 else 0.0
-
-
-@njit(cache=True)
-def floating_cables(state: Array, l0: Array, l0_dot: Array, cables: Array, out: Array) -> None:
-    """Writes tensions [N], lengths [m] and slack flags (0 or 1) to `out`, shape (3, m)."""
-    _cable_states(floating_motion(state), l0, l0_dot, cables, out)
-
-
-@njit(cache=True)
-def planar_cables(
-    state: Array, l0: Array, l0_dot: Array, cables: Array, out: Array, height: float
-) -> None:
-    """As `floating_cables` for a platform on a planar joint."""
-    _cable_states(planar_motion(state, height), l0, l0_dot, cables, out)

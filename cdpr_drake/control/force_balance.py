@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from pydrake.math import RigidTransform
 
 from cdpr_drake.arrays import Array
 from cdpr_drake.geometry.motion_kernel import Motion
@@ -88,26 +87,6 @@ def point_mass_force(
     errors = Kp * (np.asarray(p_WD) - p_WC) + Kd * (np.asarray(v_WD) - v_WC)
     wanted: Array = mass * (a_WD + errors + np.array([0.0, 0.0, gravity])) + damping
     return wanted
-
-
-def carried_point(
-    X_WP: RigidTransform, V_WP: Array, A_WP: Array, p_PC: Array
-) -> tuple[Array, Array, Array]:
-    """Position [m], velocity [m/s] and acceleration [m/s^2] in W of a point that P carries.
-
-    Args:
-        X_WP: Pose of P.
-        V_WP: Its spatial velocity in W, shape (6,) [rad/s, m/s].
-        A_WP: Its spatial acceleration in W, shape (6,) [rad/s^2, m/s^2].
-        p_PC: The point in P, shape (3,) [m].
-    """
-    arm = X_WP.rotation().matrix() @ p_PC
-    turned = np.cross(V_WP[:3], arm)
-    return (
-        X_WP.translation() + arm,
-        V_WP[3:] + turned,
-        A_WP[3:] + np.cross(A_WP[:3], arm) + np.cross(V_WP[:3], turned),
-    )
 
 
 @njit(cache=True)

@@ -125,11 +125,6 @@ class ConvexShape:
         """The shape given in the frame of A, for X_AB, of one given in that of B."""
         return ConvexShape((X @ self.points.T).T, self.radius, self.name)
 
-    def enclosing_ball(self) -> tuple[Array, float]:
-        """Middle, shape (3,) [m], and radius [m] of a ball round it, not the least one."""
-        middle = 0.5 * (np.min(self.points, axis=0) + np.max(self.points, axis=0))
-        return middle, float(np.max(np.linalg.norm(self.points - middle, axis=1))) + self.radius
-
     def distance(self, other: ConvexShape) -> tuple[float, Array, Array, Array]:
         """Signed distance from another shape in the same frame [m], below 0 where they overlap.
 

@@ -28,11 +28,11 @@ from cdpr_drake.cables.simulation_kernel import (
     outputs_kernel,
 )
 from cdpr_drake.cables.states import cable_derivatives, cable_state, check_breaking, slack_tensions
-from cdpr_drake.cables.straight_kernel import floating_cables, floating_force
+from cdpr_drake.cables.straight_kernel import cable_pull, floating_force
 from cdpr_drake.errors import CableGeometryError, CableModelError
 from cdpr_drake.geometry.cable_paths import cable_paths
 from cdpr_drake.geometry.cable_set import CableSet
-from cdpr_drake.geometry.motion_kernel import cable_line
+from cdpr_drake.geometry.motion_kernel import cable_line, floating_motion
 from cdpr_drake.geometry.poses import pose_from_angles
 from cdpr_drake.geometry.pulley_kernel import (
     CABLE_SET_COLUMNS,
@@ -110,11 +110,12 @@ def test_straight_without_pulleys_it_is_the_kernel_of_the_simulation(X_WP, strai
     l0, l0_dot = lengths_for(cables, X_WP, strain), 0.1 * strain
     state = cable_state(cables, "kelvin_voigt", X_WP, l0, V, l0_dot)
     x = np.concatenate([X_WP.rotation().ToQuaternion().wxyz(), X_WP.translation(), V])
-    force, table = np.empty(6), np.empty((3, 8))
+    force, motion = np.empty(6), floating_motion(x)
     floating_force(x, l0, l0_dot, cables.packed(), 0, force)
-    floating_cables(x, l0, l0_dot, cables.packed(), table)
-    np.testing.assert_allclose(state.tensions, table[0], atol=ES * LIMIT)
-    np.testing.assert_allclose(state.lengths, table[1], rtol=LIMIT)
+    of_each = zip(cables.packed(), l0, l0_dot, strict=True)
+    tensions, lengths = np.array([cable_pull(motion, *one)[:2] for one in of_each]).T
+    np.testing.assert_allclose(state.tensions, tensions, atol=ES * LIMIT)
+    np.testing.assert_allclose(state.lengths, lengths, rtol=LIMIT)
     np.testing.assert_allclose(state.wrench, force, atol=10 * ES * LIMIT)
     np.testing.assert_array_equal(state.slack, strain < 0.0)
 

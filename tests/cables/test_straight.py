@@ -12,16 +12,15 @@ from cdpr_drake.cables.elastic_law import (
     stretched_lengths,
     unstrained_lengths,
 )
-from cdpr_drake.cables.straight_kernel import (
-    cable_pull,
-    floating_cables,
-    floating_force,
-    planar_cables,
-    planar_force,
-)
+from cdpr_drake.cables.straight_kernel import cable_pull, floating_force, planar_force
 from cdpr_drake.cables.straight_lanes_kernel import floating_lanes_force, put_columns
 from cdpr_drake.geometry.cable_paths import cable_paths
-from cdpr_drake.geometry.motion_kernel import CABLE_COLUMNS, floating_motion, pack_cables
+from cdpr_drake.geometry.motion_kernel import (
+    CABLE_COLUMNS,
+    floating_motion,
+    pack_cables,
+    planar_motion,
+)
 from cdpr_drake.geometry.poses import rotation_from_angles, rotation_from_vector
 from cdpr_drake.geometry.straight_cables import cable_lengths, length_jacobian, wrench_matrix
 from cdpr_drake.models.robot_loader import load_robot
@@ -63,24 +62,27 @@ def random_cables(count, seed):
         yield random, random.uniform(0.5, 3.0, M), random.uniform(-1.0, 1.0, M)
 
 
+def pulls(motion, cables, l0, l0_dot):
+    """Tensions and lengths, shape (2, m)."""
+    of_each = zip(cables, l0, l0_dot, strict=True)
+    return np.array([cable_pull(motion, *one)[:2] for one in of_each]).T
+
+
 def floating(state, l0, l0_dot, cables=CABLES):
-    force, table = np.full(6, np.nan), np.full((3, len(l0)), np.nan)
+    force = np.full(6, np.nan)
     floating_force(state, l0, l0_dot, cables, 0, force)
-    floating_cables(state, l0, l0_dot, cables, table)
-    return force, table
+    return force, pulls(floating_motion(state), cables, l0, l0_dot)
 
 
 def planar(state, l0, l0_dot):
-    force, table = np.full(3, np.nan), np.full((3, M), np.nan)
+    force = np.full(3, np.nan)
     planar_force(state, l0, l0_dot, CABLES, 0, force, HEIGHT)
-    planar_cables(state, l0, l0_dot, CABLES, table, HEIGHT)
-    return force, table
+    return force, pulls(planar_motion(state, HEIGHT), CABLES, l0, l0_dot)
 
 
 def check_cables(table, tensions, lengths, l0):
     close(table[0], tensions, FORCE)
     close(table[1], lengths, 0.0)
-    np.testing.assert_array_equal(table[2], table[0] == 0.0)
     assert np.all(table[0] >= 0.0)  # cables only pull
     assert np.all(table[0][table[1] < l0] == 0.0)
 
@@ -150,7 +152,7 @@ def test_slack_cables_have_exactly_no_tension_and_leave_the_platform_alone():
     state = np.array([1.0, 0, 0, 0, 0, 0, 1, *np.ones(6)])  # not even damping remains
     lengths = floating(state, np.ones(M), np.zeros(M))[1][1]
     force, table = floating(state, 1.001 * lengths, np.zeros(M))
-    np.testing.assert_array_equal(table[[0, 2]], [np.zeros(M), np.ones(M)])
+    np.testing.assert_array_equal(table[0], np.zeros(M))
     np.testing.assert_array_equal(force, np.zeros(6))
 
 
@@ -159,7 +161,7 @@ def test_a_cable_that_is_just_straight_or_slackens_fast_is_slack(l0, upward):
     state = AT_ORIGIN.copy()
     state[12] = upward  # towards the exit point
     _, table = floating(state, np.array([l0]), np.zeros(1), HANGING)
-    np.testing.assert_array_equal(table[:, 0], [0.0, 2.0, 1.0])
+    np.testing.assert_array_equal(table[:, 0], [0.0, 2.0])
 
 
 def test_winding_in_while_stretched_adds_damping_tension():

@@ -10,7 +10,6 @@ from cdpr_drake.control.force_balance import (
     FORCE,
     WRENCH,
     balanced_rows,
-    carried_point,
     force_problem,
     point_mass_force,
 )
@@ -45,6 +44,13 @@ def force_law(X_WP, V_WP, X_WD, V_WD, A_WD, robot=ROBOT, *, point_mass=True):
     return computed_torque(X_WP, V_WP, X_WD, V_WD, A_WD, dynamics=dynamics, gains=GAINS)
 
 
+def carried(X_WP, V_WP, A_WP):
+    """Position, velocity and acceleration in W of C, which P carries."""
+    arm, turned = X_WP.rotation() @ C, np.cross(V_WP[:3], X_WP.rotation() @ C)
+    inwards = np.cross(V_WP[:3], turned)
+    return X_WP @ C, V_WP[3:] + turned, A_WP[3:] + np.cross(A_WP[:3], arm) + inwards
+
+
 def close(found, expected):
     scale = max(1.0, float(np.max(np.abs(expected))))
     return np.max(np.abs(found - expected)) <= ROUNDING * scale
@@ -59,8 +65,8 @@ def test_the_centre_of_mass_accelerates_as_asked(r, p, V_WP, off, p_WD, V_WD, A_
     plant.SetFreeBodyPose(context, in_plant.body, X_WP)
     plant.SetVelocities(context, V_WP)
     wrench = force_law(X_WP, V_WP, X_WD, V_WD, A_WD)
-    desired = carried_point(X_WD, V_WD, A_WD, C)
-    p_WC, v_WC, _ = carried_point(X_WP, V_WP, np.zeros(6), C)
+    desired = carried(X_WD, V_WD, A_WD)
+    p_WC, v_WC, _ = carried(X_WP, V_WP, np.zeros(6))
     force = point_mass_force(
         p_WC, v_WC, *desired, mass=ROBOT.platform.mass, gravity=ROBOT.gravity,
         gains=(120.0, 25.0), damping=DAMPING[0] * V_WP[3:],
@@ -75,7 +81,7 @@ def test_the_centre_of_mass_accelerates_as_asked(r, p, V_WP, off, p_WD, V_WD, A_
         - plant.CalcBiasTerm(context)
         + plant.CalcGravityGeneralizedForces(context),
     )
-    _, _, a_WC = carried_point(X_WP, V_WP, A_WP, C)
+    _, _, a_WC = carried(X_WP, V_WP, A_WP)
     goal, speed, asked = desired
     assert close(a_WC, asked + 120.0 * (goal - p_WC) + 25.0 * (speed - v_WC))
 

@@ -1,7 +1,4 @@
-"""Measures the start of the studio, its scene while a point is dragged, and plots; prints JSON.
-
-`python -m tests.studio.measure start`: processor time of the studio's process, also of Python's
-start, to its address, to its page, and to the tensions at the pose in Chromium; of five starts.
+"""Measures the studio's scene while a point is dragged, and plots; prints JSON.
 
 `python -m tests.studio.measure drag`: how far the workspace in the scene is behind the hand that
 drags an exit point, by real events of the mouse, without waiting for what is drawn. The place of
@@ -14,21 +11,19 @@ scene beside them, and without, and rows that came in eight seconds.
 """
 
 import json
-import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-import httpx
 import numpy as np
 from selenium.webdriver import ActionChains
 from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
-from tests.chromium import chromium, complaints, wait_for
+from tests.chromium import complaints, wait_for
 from tests.studio.pictures import DRAWN, POINT
 from tests.studio.run_page import FRAMES, opened, press, text_of, write_scenario
-from tests.studio.served import LONGEST_START, served
+from tests.studio.served import LONGEST_START
 
 LIVE = text_of(".studio-live")
 
@@ -70,32 +65,6 @@ return [Math.trunc(frame.left + x), Math.trunc(frame.top + y)];
 
 DRAGS, STEP, PERIOD = 150, 3, 0.06
 """Events of the mouse, what it moves between two of them [px], and the time [s]."""
-
-
-def start():
-    """Processor time to each stage of five starts [s], and the page's size."""
-    for _ in range(5):
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            tempfile.TemporaryDirectory() as profile,
-            served(folder) as (address, process),
-            httpx.Client(timeout=120.0) as client,
-            chromium(Path(profile)) as page,
-        ):
-            told = {"to_address_s": processor_time(process.pid)}
-            client.get(address)  # it gives the cookie
-            told["page_kb"] = len(client.get(address.partition("?")[0]).content) / 1e3
-            told["to_page_s"] = processor_time(process.pid)
-            page.get(address)
-            wait_for(page, f"{LIVE}.includes('limits')")
-            told["to_tensions_s"] = processor_time(process.pid)
-            print(json.dumps(told))
-
-
-def processor_time(pid):
-    """Of a process and its threads [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def drag():
@@ -186,4 +155,4 @@ def percentiles(values):
 
 
 if __name__ == "__main__":
-    {"start": start, "drag": drag, "plots": plots}[sys.argv[1]]()
+    {"drag": drag, "plots": plots}[sys.argv[1]]()
