@@ -22,8 +22,7 @@ from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
 from tests.chromium import complaints, wait_for
 from tests.studio.pictures import DRAWN, POINT
-from tests.studio.run_page import FRAMES, opened, press, text_of, write_scenario
-from tests.studio.served import LONGEST_START
+from tests.studio.served import FRAMES, LONGEST_START, opened, press, text_of, write_scenario
 
 LIVE = text_of(".studio-live")
 

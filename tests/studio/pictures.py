@@ -19,8 +19,7 @@ from cdpr_drake.studio.boards import ASKED, write_asked
 from cdpr_drake.studio.panel import PANELS
 from cdpr_drake.studio.results import subject_of
 from tests.chromium import chromium, wait_for
-from tests.studio.run_page import press, text_of
-from tests.studio.served import served
+from tests.studio.served import press, served, text_of
 
 SIZES = {"1280": (1280, 800), "phone": (390, 844)}
 

@@ -25,8 +25,7 @@ import numpy as np
 
 from cdpr_drake.studio.panel import PANELS
 from tests.chromium import chromium
-from tests.studio.run_page import button, write_scenario
-from tests.studio.served import served
+from tests.studio.served import button, served, write_scenario
 
 HOSTS = tuple(f"127.0.0.{k}" for k in range(1, 5))
 """Cookies are kept by host: a session each, in one browser."""

@@ -15,8 +15,7 @@ from cdpr_drake.studio.panel import PANELS
 from tests.chromium import LONGEST_WAIT, axe_file, cleared, complaints, grave, wait_for
 from tests.models.formats.foreign_files import caspr
 from tests.studio.pictures import DRAWN, POINT, VIEWER, look
-from tests.studio.run_page import FRAMES, press, text_of, write_scenario
-from tests.studio.served import LONGEST_START, served
+from tests.studio.served import FRAMES, LONGEST_START, press, served, text_of, write_scenario
 
 SAYS = "document.body.innerText.includes('{}')"
 

@@ -34,7 +34,7 @@ from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.cli.commands import ended
 from tests.studio.conftest import RUN_SETTINGS
 from tests.studio.pages import LONGEST, another_tab, archive, do, field, in_scene, put, until
-from tests.studio.run_page import write_scenario
+from tests.studio.served import write_scenario
 
 ROBOT, OTHER = "acrobot_small", "planar"
 
