@@ -140,18 +140,13 @@ class Board:
     def _read(self, folder: Path) -> Entry:
         asked = _asked(self._beside(folder))
         words = tuple(map(str, asked["words"])) if asked else None
-        about = Subject(str(asked.get("robot", "")), str(asked.get("digest", "")))
-        name = f"{folder.name}, stopped" if words else folder.name
         file = numbers_file(folder)
         return Entry(
-            folder,
-            name,
-            asked=words,
-            about=about,
-            files=frozenset(path.name for path in folder.glob("*")),
-            is_whole=self.is_whole(folder),
+            folder, f"{folder.name}, stopped" if words else folder.name, asked=words,
+            about=Subject(str(asked.get("robot", "")), str(asked.get("digest", ""))),
+            files=frozenset(path.name for path in folder.glob("*")), is_whole=self.is_whole(folder),
             changed=0.0 if file is None else file.stat().st_mtime,
-        )
+        )  # fmt: skip
 
     def _beside(self, folder: Path) -> Path:
         return self.folder / f".{folder.name}{ASKED}"
