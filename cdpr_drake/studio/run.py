@@ -22,16 +22,7 @@ from cdpr_drake.studio.numbers import Pair, pair_table, pairs
 from cdpr_drake.studio.panel import COMPARED, RUN, offer, robot_argument, show_errors
 from cdpr_drake.studio.plots import Chart, MovingPlots, plot_row
 from cdpr_drake.studio.results import Subject, subject_of
-from cdpr_drake.studio.runs import (
-    NO_RUN,
-    READING,
-    SPEEDS,
-    FinishedRun,
-    RunBoard,
-    RunJob,
-    Sample,
-    identity,
-)
+from cdpr_drake.studio.runs import NO_RUN, READING, SPEEDS, FinishedRun, RunBoard, RunJob, Sample
 from cdpr_drake.studio.scenario import ScenarioDraft, ScenarioForm
 from cdpr_drake.studio.session import Workbench
 from cdpr_drake.studio.views import leaves, read_behind, send_file, show_results
@@ -404,8 +395,8 @@ class RunPanel:
         whole = [key for key, entry in choices.items() if entry.is_whole and key != board.shown]
         others = {"": "none"} | {key: key for key in whole}
         offer(self._compare, others, board.compared if board.compared in others else "")
-        if self._shown != identity(board.entry):
-            self._shown, self._fold.value = identity(board.entry), False
+        if self._shown != board.looked_at:
+            self._shown, self._fold.value = board.looked_at, False
             self._results.clear()
         job = board.job
         broken = {event.get("cable") for event in job.events}

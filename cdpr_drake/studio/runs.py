@@ -265,11 +265,6 @@ class FinishedRun:
         return self.samples[row], self._drawn[1]
 
 
-def identity(entry: Entry | None) -> tuple[Path, Job | None] | None:
-    """What tells runs apart: one may come after another in a folder."""
-    return None if entry is None else (entry.folder, entry.job)
-
-
 def _picture(meshcat: Meshcat, robot: Robot, scenario: Any) -> RobotPicture:
     """The robot of a scenario and all that is round it."""
     servo, cables, world = scenario, None, None
@@ -324,6 +319,11 @@ class RunBoard(Board):
         return job if isinstance(job, RunJob) else NO_RUN
 
     @property
+    def looked_at(self) -> tuple[Path, Job | None] | None:
+        """Folder and job that are looked at: one run may come after another in a folder."""
+        return None if self.entry is None else (self.entry.folder, self.entry.job)
+
+    @property
     def state(self) -> str:
         """How the run is, in a few words; empty: none is looked at."""
         job = self.job
@@ -342,10 +342,10 @@ class RunBoard(Board):
 
     def follow(self) -> dict[str, Entry]:
         """As every board, and shows another run where that is another one."""
-        before, choices = identity(self.entry), super().follow()
+        before, choices = self.looked_at, super().follow()
         if self.compared == self.shown:
             self.compared = ""
-        if before != identity(self.entry):
+        if before != self.looked_at:
             self.run = self.job
             self._unreadable.clear()
         return choices
@@ -358,10 +358,10 @@ class RunBoard(Board):
         try:
             if other is None or self.other is None or other.folder != self.other.folder:
                 self.other = await self._finished(other)
-            entry = self.entry
+            before = self.looked_at
             if self.job.state.is_over and not isinstance(self.run, FinishedRun):
-                done = await self._finished(entry)
-                if done is not None and identity(entry) == identity(self.entry):
+                done = await self._finished(self.entry)
+                if done is not None and before == self.looked_at:
                     self.run = done
                     self.cursor = done.end if self.cursor is None else min(self.cursor, done.end)
         finally:
