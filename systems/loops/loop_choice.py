@@ -132,7 +132,7 @@ def set_loop(
     why = many_steps_reason(asked, repeated)
     if not why or chosen.integration.engine != COMPILED or asked.integration.loop == DIAGRAM:
         return chosen, words  # type: ignore[return-value]
-    reason = "who watches looks into one" if watched else diagram_reason(chosen)
+    reason = "a viewer looks into one" if watched else diagram_reason(chosen)
     if reason:
         return chosen, f"{words or asked.name}; in a diagram, as {reason}"  # type: ignore[return-value]
     other = "with overrides integration.loop=diagram"

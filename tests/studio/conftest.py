@@ -15,7 +15,8 @@ from tests.studio.pages import opened_page, until
 from tests.studio.served import served
 
 RUN_SETTINGS = ("camera.kind=projected", "duration=0.2")
-"""Of a short run of acrobot_pbvs."""
+RUN = ("simulate", "acrobot_pbvs", *(f"--set={item}" for item in RUN_SETTINGS))
+"""A short run and its settings."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -29,8 +30,7 @@ def _not_searched_for_garbage():
 def alone(tmp_path_factory):
     """Folder that the command writes for a short run that nobody looks at."""
     folder = tmp_path_factory.mktemp("alone") / "runs" / "short"
-    options = [f"--set={item}" for item in RUN_SETTINGS]
-    assert ended("simulate", "acrobot_pbvs", *options, f"--out={folder}") == 0
+    assert ended(*RUN, f"--out={folder}") == 0
     return folder
 
 

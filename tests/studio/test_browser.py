@@ -238,11 +238,9 @@ def test_axe_sees_what_is_wrong(still):
 def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
     tmp_path, started_browser
 ):
-    folder = tmp_path / "work"
-    folder.mkdir()
-    scenario = write_scenario(folder, **NEAR)
-    window = 1280, 1000
-    with cleared(started_browser, window) as page, served(folder, str(scenario)) as (address, _):
+    scenario = write_scenario(tmp_path, **NEAR)
+    size = 1280, 1000
+    with cleared(started_browser, size) as page, served(tmp_path, str(scenario)) as (address, _):
         page.get(address)
         press(page, "Run")
         wait_for(page, "document.querySelector('[aria-label=duration]') !== null")
@@ -253,12 +251,12 @@ def test_a_run_converges_before_the_eyes_and_another_one_ends_with_the_server(
         wait_for(page, f"{text_of('.cdpr-state')} === 'finished'")
         wait_for(page, f"{INK} > 50")
         assert not complaints(page)
-        done = folder / "runs" / "acrobot_pbvs"
+        done = tmp_path / "runs" / "acrobot_pbvs"
         assert json.loads((done / "summary.json").read_text())["outcome"] == "converged"
         page.execute_script("document.querySelector('.cdpr-run .q-checkbox').click()")
         press(page, "Start")
         wait_for(page, f"{text_of('.cdpr-state')} === 'paused'", LONGEST_START)
         page.refresh()
         wait_for(page, f"{text_of('.cdpr-state')} === 'paused' && {FRAMES}[1] > 0")
-    left = json.loads((folder / "runs" / "acrobot_pbvs-2" / "summary.json").read_text())
+    left = json.loads((tmp_path / "runs" / "acrobot_pbvs-2" / "summary.json").read_text())
     assert left["outcome"] == "interrupted"

@@ -32,7 +32,7 @@ from cdpr_drake.studio.runs import FinishedRun, RunJob
 from cdpr_drake.studio.views import View, read_numbers
 from cdpr_drake.systems.diagrams.load import load_scenario
 from tests.cli.commands import ended
-from tests.studio.conftest import RUN_SETTINGS
+from tests.studio.conftest import RUN, RUN_SETTINGS
 from tests.studio.pages import LONGEST, another_tab, archive, do, field, in_scene, put, until
 from tests.studio.served import write_scenario
 
@@ -111,13 +111,13 @@ async def test_a_run_that_is_watched_and_stopped_goes_on_by_the_command_with_the
     await until(lambda: job.progress[0] == pytest.approx(job.samples[-1]["t"] / 0.2))
     await until(lambda: job.at(None)[1].startswith(JPEG))
     assert job.samples[-1]["t"] == row  # it stands
+    job.tell("step", seconds=0.05)
+    await until(lambda: job.samples[-1]["t"] > 0.05 and job.state == "paused")
     job.stop()
     assert await job.wait(LONGEST)
     assert job.message.endswith("the same command goes on")
     assert (job.folder / PARTS / CHECKPOINT).is_file()
-    settings = [f"--set={item}" for item in RUN_SETTINGS]
-    job = Job(["simulate", "acrobot_pbvs", *settings, f"--out={job.folder}", "--json"],
-              tmp_path, job.folder)  # fmt: skip
+    job = Job([*RUN, f"--out={job.folder}", "--json"], tmp_path, job.folder)
     job.begin()
     assert await job.wait(LONGEST)
     assert job.state == "finished", job.message

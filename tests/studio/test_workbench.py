@@ -64,9 +64,8 @@ async def test_a_point_is_dragged_and_the_numbers_are_those_of_the_commands(
     await bench.save("mine.yaml", overwrite=False)
     await settled(bench)
     where = tmp_path / "mine.yaml", "--pose=0.1,-0.05,0.3,5,-3,10"
-    html, answer, sketch = (
-        answer_html(bench.answer, bench.command_name), bench.answer, bench.live.sketch,
-    )  # fmt: skip
+    html = answer_html(bench.answer, bench.command_name)
+    answer, sketch = bench.answer, bench.live.sketch
     assert answer.tensions.tolist() == told(capsys, "tension", *where)["tensions_n"]
     assert all(f"</div></td><td>{tension:.2f}</td>" in html for tension in answer.tensions)
     assert "cdpr tension mine.yaml --pose=0.1,-0.05,0.3,5,-3,10 --method=" in html
@@ -196,10 +195,8 @@ async def test_a_workspace_is_drawn_when_a_point_moves_and_not_before(bench, mon
     live, order = bench.live, []
     bench.ask()
     await settled(bench)
-    assert [in_scene(bench, path) for path in (WORKSPACE, SHADER)] == [
-        False,
-        True,
-    ]  # which stays compiled
+    # The shader's triangle, so that it stays compiled.
+    assert [in_scene(bench, path) for path in (WORKSPACE, SHADER)] == [False, True]
     await drag(bench, THERE)
     coarse = live.sketch
     assert (in_scene(bench, WORKSPACE), coarse.poses) == (True, COARSE)

@@ -215,7 +215,7 @@ def test_a_run_that_was_acted_on_never_goes_on_from_the_middle(tmp_path):
 
 def test_a_run_that_is_long_enough_for_the_compiled_loop_is_steered(tmp_path):
     ours, theirs = Pipe()
-    with ours:
+    with ours, theirs:
         send(ours, Message("do", {"what": "stop"}))
         run = simulate(
             "acrobot_pbvs", SETTINGS, folder=tmp_path / "out", duration=700.0,
@@ -223,4 +223,3 @@ def test_a_run_that_is_long_enough_for_the_compiled_loop_is_steered(tmp_path):
         )  # fmt: skip
         assert receive(ours).data["takes"] == []
     assert (run.stopped, run.scenario.integration.loop) == (True, "automatic")
-    theirs.close()

@@ -42,7 +42,7 @@ def test_a_long_run_takes_the_loop_unless_somebody_watches():
     shown, words = set_loop(long, watched=True)
     assert not uses_compiled_loop(shown)
     assert "by the compiled engine" in words
-    assert "in a diagram, as who watches looks into one" in words
+    assert "in a diagram, as a viewer looks into one" in words
     asked = load_scenario("acrobot_mobile_robot", ["integration.loop=diagram"])
     assert not uses_compiled_loop(set_loop(asked)[0])
 
